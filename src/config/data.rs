@@ -1,0 +1,37 @@
+//! Settings of the dataset and of the evaluation.
+
+use serde::{Deserialize, Serialize};
+
+/// `[convert]`: recordings to datasets.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct ConvertSettings {
+    /// Training episodes per validation episode (paper 4.2: 10:1; 200 episodes split 182/18).
+    pub train_per_validation: u32,
+    /// Whether failed episodes stay in the dataset.
+    pub keep_failed: bool,
+}
+
+impl Default for ConvertSettings {
+    fn default() -> Self {
+        ConvertSettings { train_per_validation: 10, keep_failed: false }
+    }
+}
+
+/// `[evaluate]`: seeded rollouts on episodes that no demo used.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct EvaluateSettings {
+    /// Episodes.
+    pub episodes: u64,
+    /// Control steps before an episode is given up; 0 = twice the 95th percentile of the demos' lengths.
+    pub horizon_steps: u32,
+    /// Whether actions are sampled from the policy's Gaussian instead of its mean.
+    pub stochastic: bool,
+}
+
+impl Default for EvaluateSettings {
+    fn default() -> Self {
+        EvaluateSettings { episodes: 500, horizon_steps: 0, stochastic: false }
+    }
+}

@@ -1,0 +1,102 @@
+//! Settings of the scene, the planner and the simulation.
+
+use crate::scene::Obstacle;
+use serde::{Deserialize, Serialize};
+
+/// `[scene]`: what stands where, used by `plan`, `simulate` and `evaluate`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct SceneSettings {
+    /// Spawn (and goal) area along x, low and high \[m\]. 30 cm in front of the arm, within its reach.
+    pub spawn_x_m: [f64; 2],
+    /// Spawn (and goal) area along y, low and high \[m\].
+    pub spawn_y_m: [f64; 2],
+    /// Whether the block's yaw is random (within a quarter turn) instead of 0.
+    pub yaw: bool,
+    /// Where the base block of the stack task stands, x y \[m\]: outside the spawn area, within reach.
+    pub base_xy_m: [f64; 2],
+    /// Coulomb friction of the block against everything.
+    pub friction: f64,
+    /// Mass of the block \[kg\].
+    pub block_mass_kg: f64,
+    /// Fixed boxes to keep clear of (`[[scene.obstacles]]`).
+    pub obstacles: Vec<Obstacle>,
+}
+
+impl Default for SceneSettings {
+    fn default() -> Self {
+        SceneSettings {
+            spawn_x_m: [0.32, 0.62],
+            spawn_y_m: [-0.15, 0.15],
+            yaw: false,
+            base_xy_m: [0.45, 0.27],
+            friction: 1.0,
+            block_mass_kg: 0.1,
+            obstacles: Vec::new(),
+        }
+    }
+}
+
+/// `[plan]`: demonstrations as smooth joint trajectories.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct PlanSettings {
+    /// Demonstrations to plan. Paper: 200 pick-up, 250 pick-and-place, 300 stack.
+    pub episodes: u64,
+    /// Fraction of the joints' velocity limits that plans may use (0..1].
+    pub speed: f64,
+    /// Largest joint acceleration in a plan \[rad/s^2\].
+    pub max_acceleration_rad_s2: f64,
+    /// Iterations of the path search before a transit counts as blocked.
+    pub search_iterations: usize,
+    /// Shortcut attempts after a search.
+    pub shortcut_iterations: usize,
+}
+
+impl Default for PlanSettings {
+    fn default() -> Self {
+        PlanSettings {
+            episodes: 200,
+            speed: 0.8,
+            max_acceleration_rad_s2: 2.0,
+            search_iterations: 5000,
+            shortcut_iterations: 100,
+        }
+    }
+}
+
+/// `[simulate.pulses]`: disturbance pulses while recording; the recorded command is the correction.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct PulseSettings {
+    /// Probability per step that a pulse begins; 0 turns pulses off.
+    pub probability: f64,
+    /// Length of a pulse in control steps.
+    pub steps: u32,
+    /// Standard deviation of a pulse's constant extra velocity on each arm joint \[rad/s\].
+    pub sigma_rad_s: f64,
+}
+
+impl Default for PulseSettings {
+    fn default() -> Self {
+        PulseSettings { probability: 0.0, steps: 4, sigma_rad_s: 0.2 }
+    }
+}
+
+/// `[simulate]`: execution of plans in contact physics.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct SimulateSettings {
+    /// Variance of the Gaussian noise on each of the nine commands, per control step \[(rad/s)^2\] (paper 4.1).
+    pub noise_variance: f64,
+    /// Control steps after which an episode is given up.
+    pub max_steps: u32,
+    /// Disturbance pulses.
+    pub pulses: PulseSettings,
+}
+
+impl Default for SimulateSettings {
+    fn default() -> Self {
+        SimulateSettings { noise_variance: 0.001, max_steps: 400, pulses: PulseSettings::default() }
+    }
+}

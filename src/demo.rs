@@ -1,0 +1,197 @@
+//! Trajectories: an executed [`Episode`] with all that was recorded, and a [`Demo`], the arrays that learning reads.
+
+use crate::scene::Scene;
+use crate::state::{Action, FINGERS, JOINTS, State};
+use crate::tasks::{FailureClass, Task};
+use serde::{Deserialize, Serialize};
+
+/// Which part of a plan the demonstrator follows.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Phase {
+    /// From the ready pose to the grasp, fingers open.
+    Approach,
+    /// Fingers close, arm still.
+    Close,
+    /// Lift, carry and lower with the block in the hand.
+    Carry,
+    /// Fingers open, arm still.
+    Open,
+    /// Straight up and away from the released block.
+    Retreat,
+}
+
+impl Phase {
+    /// All phases in order; the position is the code used in files.
+    pub const ALL: [Phase; 5] = [Phase::Approach, Phase::Close, Phase::Carry, Phase::Open, Phase::Retreat];
+
+    /// Lower-case name.
+    pub fn name(self) -> &'static str {
+        ["approach", "close", "carry", "open", "retreat"][self as usize]
+    }
+}
+
+/// What is known after a control step beyond the state itself.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Contacts {
+    /// Normal force between each finger and the block \[N\].
+    pub finger_block_n: [f64; FINGERS],
+    /// Whether the block touches the table.
+    pub block_table: bool,
+    /// Whether the block touches the base block.
+    pub block_base: bool,
+    /// Whether any robot link touches an obstacle.
+    pub robot_obstacle: bool,
+    /// Whether any robot link touches the table.
+    pub robot_table: bool,
+}
+
+/// One control step: the state before it, the action taken in it, and what held in that state.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Step {
+    /// s_t.
+    pub state: State,
+    /// Pose of the base block now (it may be pushed), if the task has one.
+    pub base_now: Option<crate::state::Pose>,
+    /// What the controller asked for \[rad/s\].
+    pub commanded: Action,
+    /// What the motors were given: commanded + noise + pulse, clamped to the joint velocity limits \[rad/s\].
+    pub executed: Action,
+    /// Contacts in s_t.
+    pub contacts: Contacts,
+    /// Speed of the block's centre \[m/s\].
+    pub block_speed_m_s: f64,
+    /// Reward earned in this step (each milestone once per episode).
+    pub reward: f64,
+    /// Which of `task.condition_names()` hold in s_t, in that order.
+    pub conditions: Vec<bool>,
+    /// The demonstrator's phase; `None` under a learned policy.
+    pub phase: Option<Phase>,
+}
+
+/// An executed episode: T steps and the state after the last.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Episode {
+    /// Episode number within its run (also its random stream).
+    pub index: u64,
+    /// The scene it started in.
+    pub scene: Scene,
+    /// T steps.
+    pub steps: Vec<Step>,
+    /// s_{T+1}, with conditions and contacts; its actions are zero.
+    pub last: Step,
+    /// Whether the task was solved.
+    pub success: bool,
+    /// Why not, if it was not.
+    pub failure: Option<FailureClass>,
+}
+
+impl Episode {
+    /// The arrays that learning reads.
+    ///
+    /// # Errors
+    /// See [`Demo::new`].
+    pub fn to_demo(&self) -> Result<Demo, String> {
+        let states = self.steps.iter().chain([&self.last]).flat_map(|s| s.state.to_row()).collect();
+        let rows = |pick: fn(&Step) -> &Action| self.steps.iter().flat_map(|s| pick(s).map(|v| v as f32)).collect::<Vec<f32>>();
+        Demo::new(self.scene.task, states, rows(|s| &s.commanded), rows(|s| &s.executed))
+    }
+}
+
+/// d = <(s_t^E, a_t^E)>: one demo trajectory, T + 1 states and T actions, row-major f32.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Demo {
+    task: Task,
+    states: Vec<f32>,
+    actions: Vec<f32>,
+    executed: Vec<f32>,
+}
+
+impl Demo {
+    /// Checks and wraps the arrays: `states` (T+1) x D, `actions` (commanded) and `executed` T x 9 \[rad/s\].
+    ///
+    /// # Errors
+    /// Says which length or value is wrong: T = 0, rows that do not fit, or a number that is not finite.
+    pub fn new(task: Task, states: Vec<f32>, actions: Vec<f32>, executed: Vec<f32>) -> Result<Self, String> {
+        let dim = task.state_dim();
+        let steps = actions.len() / JOINTS;
+        if steps == 0 || actions.len() != steps * JOINTS {
+            return Err(format!("a demo needs T x {JOINTS} actions with T >= 1, got {} numbers", actions.len()));
+        }
+        if executed.len() != actions.len() {
+            return Err(format!("{} executed against {} commanded action numbers", executed.len(), actions.len()));
+        }
+        if states.len() != (steps + 1) * dim {
+            return Err(format!(
+                "{task} has states of {dim} numbers, so {steps} actions need {} state numbers, got {}",
+                (steps + 1) * dim,
+                states.len()
+            ));
+        }
+        for (name, values, width) in
+            [("state", &states, dim), ("action", &actions, JOINTS), ("executed action", &executed, JOINTS)]
+        {
+            if let Some(at) = values.iter().position(|v| !v.is_finite()) {
+                return Err(format!(
+                    "{name} of step {}, entry {} is {}, not a finite number",
+                    at / width,
+                    at % width,
+                    values[at]
+                ));
+            }
+        }
+        Ok(Demo { task, states, actions, executed })
+    }
+
+    /// The task.
+    pub fn task(&self) -> Task {
+        self.task
+    }
+
+    /// Number of actions T.
+    #[allow(clippy::len_without_is_empty, reason = "a demo is never empty")]
+    pub fn len(&self) -> usize {
+        self.actions.len() / JOINTS
+    }
+
+    /// All states, (T+1) x D row-major.
+    pub fn states(&self) -> &[f32] {
+        &self.states
+    }
+
+    /// Commanded actions, T x 9 row-major \[rad/s\]: the labels of behavior cloning.
+    pub fn actions(&self) -> &[f32] {
+        &self.actions
+    }
+
+    /// Executed actions, T x 9 row-major \[rad/s\]: the inputs of the dynamics network.
+    pub fn executed(&self) -> &[f32] {
+        &self.executed
+    }
+
+    /// State t (0-based).
+    pub fn state(&self, t: usize) -> &[f32] {
+        let d = self.task.state_dim();
+        &self.states[t * d..(t + 1) * d]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_demo_refuses_wrong_lengths_and_nan() {
+        let (d, t) = (Task::PickUp.state_dim(), 3);
+        let make =
+            |states: usize, actions: usize| Demo::new(Task::PickUp, vec![0.0; states], vec![0.0; actions], vec![0.0; actions]);
+        assert_eq!(make((t + 1) * d, t * JOINTS).expect("fits").len(), t);
+        assert!(make(t * d, t * JOINTS).is_err());
+        assert!(make(d, 0).is_err());
+        assert!(make((t + 1) * d, t * JOINTS + 1).is_err());
+        let mut states = vec![0.0; (t + 1) * d];
+        states[d + 2] = f32::NAN;
+        let message = Demo::new(Task::PickUp, states, vec![0.0; t * JOINTS], vec![0.0; t * JOINTS]).unwrap_err();
+        assert!(message.contains("step 1, entry 2"), "{message}");
+    }
+}

@@ -1,0 +1,52 @@
+//! A scene: what stands where when an episode begins. Drawn once per episode, recorded with it.
+
+use crate::state::{Context, Pose};
+use crate::tasks::Task;
+use serde::{Deserialize, Serialize};
+
+/// Edge of every block \[m\] (paper 4.1: cubes of 5 cm).
+pub const BLOCK_EDGE_M: f64 = 0.05;
+
+/// An axis-aligned box that stands in the workspace, fixed.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Obstacle {
+    /// Centre x y z \[m\].
+    pub center_m: [f64; 3],
+    /// Full edge lengths x y z \[m\].
+    pub size_m: [f64; 3],
+}
+
+/// The scene of one episode. The table's top is the plane z = 0; the arm's base stands at the origin.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Scene {
+    /// The task.
+    pub task: Task,
+    /// Where the block to move stands at the start.
+    pub block: Pose,
+    /// Goal or base block.
+    pub context: Context,
+    /// Fixed boxes to keep clear of.
+    pub obstacles: Vec<Obstacle>,
+    /// Coulomb friction of the block against everything.
+    pub friction: f64,
+    /// Mass of the block \[kg\].
+    pub block_mass_kg: f64,
+}
+
+impl Scene {
+    /// Where the block's centre must end: above the start (pick-up), the goal, or on top of the base block \[m\].
+    pub fn target_m(&self) -> [f64; 3] {
+        match self.context {
+            Context::None => {
+                let [x, y, _] = self.block.position_m;
+                [x, y, crate::tasks::pick_up::TARGET_HEIGHT_M]
+            }
+            Context::Goal(goal) => goal,
+            Context::Base(base) => {
+                let [x, y, z] = base.position_m;
+                [x, y, z + BLOCK_EDGE_M]
+            }
+        }
+    }
+}

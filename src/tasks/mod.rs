@@ -1,0 +1,117 @@
+//! What a task is: scene, spawn area, named success conditions, milestones of the reward, failure classes. One file a task.
+
+mod monitor;
+pub mod pick_and_place;
+pub mod pick_up;
+mod spawn;
+pub mod stack;
+
+pub use monitor::{Monitor, Observation, Verdict};
+pub use spawn::{REST_HEIGHT_M, draw_scene};
+
+use crate::state::BASE_DIM;
+use serde::{Deserialize, Serialize};
+use std::fmt;
+use std::str::FromStr;
+
+/// The three tasks of the paper (section 4.1).
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Task {
+    /// Lift the block to 20 cm and hold it.
+    PickUp,
+    /// Carry the block to a goal on the table and release it there.
+    PickAndPlace,
+    /// Put the block on the base block and release it.
+    Stack,
+}
+
+/// Why an episode failed; the first that applies, in this order.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum FailureClass {
+    /// The hand never came within reach of the block.
+    NeverReached,
+    /// Reached, but never held between the fingers.
+    NeverGrasped,
+    /// The block lies over, fell off the base block, or the base block was pushed away.
+    Toppled,
+    /// Held once, lost in the air.
+    Dropped,
+    /// Released on a support, but not where the task wants it.
+    Misplaced,
+    /// Still on its way when the steps ran out.
+    TimedOut,
+}
+
+impl FailureClass {
+    /// All classes, in the order of tables.
+    pub const ALL: [FailureClass; 6] = [
+        FailureClass::NeverReached,
+        FailureClass::NeverGrasped,
+        FailureClass::Toppled,
+        FailureClass::Dropped,
+        FailureClass::Misplaced,
+        FailureClass::TimedOut,
+    ];
+
+    /// The name in files and tables.
+    pub fn name(self) -> &'static str {
+        ["never_reached", "never_grasped", "toppled", "dropped", "misplaced", "timed_out"][self as usize]
+    }
+}
+
+impl Task {
+    /// All tasks.
+    pub const ALL: [Task; 3] = [Task::PickUp, Task::PickAndPlace, Task::Stack];
+
+    /// The name on the command line and in files.
+    pub fn name(self) -> &'static str {
+        ["pick-up", "pick-and-place", "stack"][self as usize]
+    }
+
+    /// D: 25, 28 or 32.
+    pub fn state_dim(self) -> usize {
+        BASE_DIM + [0, 3, 7][self as usize]
+    }
+
+    /// Entries of the state that change during an episode (the rest are constants of it).
+    pub fn dynamic_dim(self) -> usize {
+        BASE_DIM
+    }
+
+    /// The instruction in words (LeRobot's task string).
+    pub fn instruction(self) -> &'static str {
+        [
+            "Pick up the block and hold it 20 cm above the table.",
+            "Pick up the block and place it at the goal position.",
+            "Pick up the block and stack it on the base block.",
+        ][self as usize]
+    }
+
+    /// Names of the conditions that are recorded: what has happened so far, then what must hold at once for 0.5 s.
+    pub fn condition_names(self) -> &'static [&'static str] {
+        match self {
+            Task::PickUp => &pick_up::CONDITIONS,
+            Task::PickAndPlace => &pick_and_place::CONDITIONS,
+            Task::Stack => &stack::CONDITIONS,
+        }
+    }
+}
+
+impl fmt::Display for Task {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.name())
+    }
+}
+
+impl FromStr for Task {
+    type Err = String;
+
+    fn from_str(s: &str) -> Result<Self, String> {
+        Task::ALL
+            .into_iter()
+            .find(|t| t.name() == s)
+            .ok_or_else(|| format!("unknown task \"{s}\"; allowed: {}", Task::ALL.map(Task::name).join(", ")))
+    }
+}
