@@ -22,7 +22,7 @@ pub const GOOD: Rgb = [20, 128, 62];
 /// The label of a failed episode.
 pub const BAD: Rgb = [196, 44, 44];
 /// The arm, from base to fingers: neighbours differ so that joints can be told apart.
-const ARM: [Rgb; 4] = [[74, 82, 98], [150, 160, 176], [108, 118, 136], [58, 64, 78]];
+const ARM: [Rgb; 4] = [[82, 90, 108], [150, 160, 176], [108, 118, 136], [86, 96, 118]];
 /// Colour of each link.
 pub const LINK_COLORS: [Rgb; LINKS] = [ARM[0], ARM[1], ARM[2], ARM[1], ARM[2], ARM[1], ARM[3], ARM[2], ARM[2], ARM[2]];
 

@@ -52,7 +52,7 @@ fn encode<W: Write>(episode: &Episode, options: &GifOptions, out: W) -> std::res
     let mut palette = Palette::new();
     let mut encoder = Encoder::new(out, options.width as u16, options.height as u16, &palette.bytes())?;
     encoder.set_repeat(Repeat::Infinite)?;
-    let renderer = Renderer::new(&episode.scene, (options.width, options.height));
+    let mut renderer = Renderer::new(&episode.scene, (options.width, options.height));
     let delay = (100.0 / f64::from(options.fps)).round() as u16;
     let last = episode.steps.len();
     let mut shown: Option<Vec<u8>> = None;

@@ -20,12 +20,12 @@ use crate::state::{Context, JOINTS, Pose};
 use camera::Camera;
 use mesh::Mesh;
 use nalgebra::{Isometry3, Translation3};
-use raster::{Paint, Rgb, Samples};
+use raster::{Area, Paint, Rgb, Samples};
 
 /// Samples along each edge of a pixel: 2 x 2 of them make its colour.
 const SUPERSAMPLING: usize = 2;
 /// The table's edges: x low and high, y low and high \[m\]. Wide enough for every default spawn area and the arm's foot.
-const TABLE_M: [[f64; 2]; 2] = [[-0.20, 0.80], [-0.45, 0.45]];
+const TABLE_M: [[f64; 2]; 2] = [[-0.14, 0.72], [-0.30, 0.40]];
 /// Thickness of the table \[m\].
 const TABLE_THICKNESS_M: f64 = 0.03;
 /// The table's upper layer, which takes shadows \[m\].
@@ -35,7 +35,7 @@ const MARKER_HALF_BAR_M: f64 = 0.0012;
 /// Room between a block that stands exactly on the target and the marker's faces \[m\].
 const MARKER_ROOM_M: f64 = 0.003;
 /// Opacity of the marker's faces.
-const MARKER_OPACITY: f32 = 0.30;
+const MARKER_OPACITY: f32 = 0.18;
 /// Tag of the samples that take shadows.
 const TAG_TABLE: u8 = 1;
 /// Smallest and largest picture edge that writers accept \[pixels\].
@@ -88,8 +88,10 @@ struct Renderer {
     size: (u32, u32),
     samples: Camera,
     pixels: Camera,
-    /// Table and floor, before anything stands on them.
-    empty: Samples,
+    /// The table, before anything stands on it: samples and pixels.
+    empty: (Samples, RgbImage),
+    /// What is being drawn; shows the empty table between two pictures.
+    canvas: Samples,
     arm: Arm,
     robot: Vec<(usize, Mesh, Rgb)>,
     block: Mesh,
@@ -102,12 +104,16 @@ impl Renderer {
     fn new(scene: &Scene, size: (u32, u32)) -> Self {
         let (width, height) = (size.0 as usize, size.1 as usize);
         let samples = Camera::new(width * SUPERSAMPLING, height * SUPERSAMPLING);
+        let canvas = table(&samples, width * SUPERSAMPLING, height * SUPERSAMPLING);
+        let mut plain = RgbImage { width: size.0, height: size.1, data: vec![0; width * height * 3] };
+        resolve(&canvas, Area::all(width, height), &mut plain);
         let half = BLOCK_EDGE_M / 2.0;
         let (target, around) = (scene.target_m(), [half + MARKER_ROOM_M; 3]);
         Renderer {
             size,
             pixels: Camera::new(width, height),
-            empty: table(&samples, width * SUPERSAMPLING, height * SUPERSAMPLING),
+            empty: (canvas.clone(), plain),
+            canvas,
             samples,
             arm: Arm::new(),
             robot: LINK_SHAPES.iter().map(|s| (s.link, Mesh::of_shape(&s.shape), colors::LINK_COLORS[s.link])).collect(),
@@ -118,22 +124,26 @@ impl Renderer {
         }
     }
 
-    fn draw(&self, step: &Step) -> RgbImage {
+    fn draw(&mut self, step: &Step) -> RgbImage {
         let base = step.base_now.or(match step.state.context {
             Context::Base(base) => Some(base),
             Context::None | Context::Goal(_) => None,
         });
+        let mut canvas = std::mem::replace(&mut self.canvas, Samples::new(0, 0, colors::BACKGROUND));
         let solids = self.solids(&step.state.q_rad, &step.state.block, base.as_ref());
-        let mut picture = self.empty.clone();
-        let mask = shadow::mask(&self.pixels, self.size.0 as usize, self.size.1 as usize, &solids);
-        shadow::darken(&mut picture, &mask, SUPERSAMPLING, TAG_TABLE);
+        let mask = shadow::Mask::new(&self.pixels, self.size.0 as usize, self.size.1 as usize, &solids);
+        mask.darken(&mut canvas, SUPERSAMPLING, TAG_TABLE);
         for (mesh, pose, rgb) in &solids {
-            picture.draw(&self.samples, mesh, pose, Paint { rgb: *rgb, opacity: 1.0, tag: 0 });
+            canvas.draw(&self.samples, mesh, pose, Paint { rgb: *rgb, opacity: 1.0, tag: 0 });
         }
         let marker = |opacity| Paint { rgb: colors::TARGET, opacity, tag: 0 };
-        picture.draw(&self.samples, &self.marker_bars, &Isometry3::identity(), marker(1.0));
-        picture.draw(&self.samples, &self.marker_faces, &Isometry3::identity(), marker(MARKER_OPACITY));
-        self.resolve(&picture)
+        canvas.draw(&self.samples, &self.marker_bars, &Isometry3::identity(), marker(1.0));
+        canvas.draw(&self.samples, &self.marker_faces, &Isometry3::identity(), marker(MARKER_OPACITY));
+        let mut picture = self.empty.1.clone();
+        resolve(&canvas, canvas.drawn.coarse(SUPERSAMPLING), &mut picture);
+        canvas.restore(&self.empty.0);
+        self.canvas = canvas;
+        picture
     }
 
     /// Everything that casts a shadow: mesh, where it is, colour.
@@ -145,22 +155,22 @@ impl Renderer {
         solids.extend(self.obstacles.iter().map(|mesh| (mesh, Isometry3::identity(), colors::OBSTACLE)));
         solids
     }
+}
 
-    /// The mean of each pixel's samples.
-    fn resolve(&self, picture: &Samples) -> RgbImage {
-        let (width, height) = self.size;
-        let count = (SUPERSAMPLING * SUPERSAMPLING) as u16;
-        let mut data = Vec::with_capacity(width as usize * height as usize * 3);
-        for y in 0..height as usize {
-            let row = |i: usize| &picture.color[(y * SUPERSAMPLING + i) * picture.width..][..picture.width];
-            let rows: [_; SUPERSAMPLING] = std::array::from_fn(row);
-            for x in 0..width as usize {
-                let cells = rows.iter().flat_map(|r| &r[x * SUPERSAMPLING..][..SUPERSAMPLING]);
-                let sum = cells.fold([0_u16; 3], |sum, c| std::array::from_fn(|i| sum[i] + u16::from(c[i])));
-                data.extend(sum.map(|v| ((v + count / 2) / count) as u8));
+/// Sets the pixels of `area` to the mean of their samples.
+fn resolve(samples: &Samples, area: Area, picture: &mut RgbImage) {
+    const COUNT: u16 = (SUPERSAMPLING * SUPERSAMPLING) as u16;
+    for y in area.rows[0]..area.rows[1] {
+        let rows: [&[[u8; 4]]; SUPERSAMPLING] =
+            std::array::from_fn(|i| &samples.color[(y * SUPERSAMPLING + i) * samples.width..][..samples.width]);
+        for x in area.columns[0]..area.columns[1] {
+            let mut sum = [COUNT / 2; 3];
+            for cell in rows.iter().flat_map(|r| &r[x * SUPERSAMPLING..(x + 1) * SUPERSAMPLING]) {
+                (0..3).for_each(|i| sum[i] += u16::from(cell[i]));
             }
+            let at = (y * picture.width as usize + x) * 3;
+            picture.data[at..at + 3].copy_from_slice(&sum.map(|v| (v / COUNT) as u8));
         }
-        RgbImage { width, height, data }
     }
 }
 
@@ -176,5 +186,6 @@ fn table(camera: &Camera, width: usize, height: usize) -> Samples {
     };
     layer(-TOP_LAYER_M, -TABLE_THICKNESS_M, 0);
     layer(0.0, -TOP_LAYER_M, TAG_TABLE);
+    samples.drawn = Area::NONE;
     samples
 }

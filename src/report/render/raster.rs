@@ -21,6 +21,48 @@ pub fn light() -> Vector3<f32> {
     Vector3::from(LIGHT).normalize()
 }
 
+/// A rectangle of samples or pixels: first and end column, first and end row. Empty when the first is not before the end.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Area {
+    /// First and end.
+    pub columns: [usize; 2],
+    /// First and end.
+    pub rows: [usize; 2],
+}
+
+impl Area {
+    /// Nothing: joining it changes nothing.
+    pub const NONE: Area = Area { columns: [usize::MAX, 0], rows: [usize::MAX, 0] };
+
+    /// All of a picture.
+    pub fn all(width: usize, height: usize) -> Self {
+        Area { columns: [0, width], rows: [0, height] }
+    }
+
+    /// The smallest rectangle around both.
+    pub fn join(self, other: Area) -> Self {
+        let around = |a: [usize; 2], b: [usize; 2]| [a[0].min(b[0]), a[1].max(b[1])];
+        Area { columns: around(self.columns, other.columns), rows: around(self.rows, other.rows) }
+    }
+
+    /// Wider by `margin` on each side, within a picture.
+    pub fn grown(self, margin: usize, width: usize, height: usize) -> Self {
+        let wider = |[first, end]: [usize; 2], most: usize| [first.saturating_sub(margin), (end + margin).min(most)];
+        Area { columns: wider(self.columns, width), rows: wider(self.rows, height) }
+    }
+
+    /// The cells of `zoom` x `zoom` that hold it.
+    pub fn coarse(self, zoom: usize) -> Self {
+        let cells = |[first, end]: [usize; 2]| [first / zoom, end.div_ceil(zoom)];
+        Area { columns: cells(self.columns), rows: cells(self.rows) }
+    }
+
+    /// Whether it holds nothing.
+    pub fn is_empty(&self) -> bool {
+        self.columns[0] >= self.columns[1] || self.rows[0] >= self.rows[1]
+    }
+}
+
 /// Samples of a picture with depth.
 #[derive(Clone, Debug)]
 pub struct Samples {
@@ -32,6 +74,8 @@ pub struct Samples {
     pub color: Vec<[u8; 4]>,
     /// Inverse distance to the camera \[1/m\]; 0 is infinitely far.
     depth: Vec<f32>,
+    /// Where something was drawn since the last [`Samples::restore`].
+    pub drawn: Area,
 }
 
 /// How a mesh is painted.
@@ -49,7 +93,21 @@ impl Samples {
     /// An empty picture.
     pub fn new(width: usize, height: usize, fill: Rgb) -> Self {
         let [r, g, b] = fill;
-        Samples { width, height, color: vec![[r, g, b, 0]; width * height], depth: vec![0.0; width * height] }
+        let count = width * height;
+        Samples { width, height, color: vec![[r, g, b, 0]; count], depth: vec![0.0; count], drawn: Area::NONE }
+    }
+
+    /// Puts back what `before` shows wherever something was drawn; both are of one size.
+    pub fn restore(&mut self, before: &Samples) {
+        let [first, end] = self.drawn.columns;
+        if !self.drawn.is_empty() {
+            for y in self.drawn.rows[0]..self.drawn.rows[1] {
+                let row = y * self.width + first..y * self.width + end;
+                self.color[row.clone()].copy_from_slice(&before.color[row.clone()]);
+                self.depth[row.clone()].copy_from_slice(&before.depth[row]);
+            }
+        }
+        self.drawn = Area::NONE;
     }
 
     /// Draws the front of a closed mesh: Lambert shading at the corners, blended between them.
@@ -65,6 +123,7 @@ impl Samples {
 
     fn fill(&mut self, a: &Corner, b: &Corner, c: &Corner, paint: Paint) {
         let Some(cover) = Cover::new([a.at, b.at, c.at], self.width, self.height) else { return };
+        self.drawn = self.drawn.join(cover.area);
         cover.each(|index, [wa, wb, wc]| {
             let depth = wa * a.depth + wb * b.depth + wc * c.depth;
             if depth <= self.depth[index] {
@@ -96,8 +155,8 @@ fn corner(camera: &Camera, vertex: &Vertex, light: &Vector3<f32>, rgb: Rgb) -> O
 
 /// The samples that a triangle covers, with their barycentric weights.
 pub struct Cover {
-    columns: [usize; 2],
-    rows: [usize; 2],
+    /// Where they are.
+    pub area: Area,
     stride: usize,
     /// Weight of each corner: constant, change per column, change per row.
     weights: [[f32; 3]; 3],
@@ -108,8 +167,8 @@ impl Cover {
     pub fn new(corners: [[f32; 2]; 3], width: usize, height: usize) -> Option<Self> {
         let [a, b, c] = corners;
         // Rows grow downwards: what is counter-clockwise seen from outside has a negative area here.
-        let area = (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]);
-        if area >= 0.0 {
+        let doubled = (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]);
+        if doubled >= 0.0 {
             return None;
         }
         let span = |i: usize, end: usize| {
@@ -117,23 +176,23 @@ impl Cover {
             let high = a[i].max(b[i]).max(c[i]) - 0.5;
             [low.ceil().max(0.0) as usize, ((high.floor() + 1.0).max(0.0) as usize).min(end)]
         };
-        let (columns, rows) = (span(0, width), span(1, height));
-        if columns[0] >= columns[1] || rows[0] >= rows[1] {
+        let area = Area { columns: span(0, width), rows: span(1, height) };
+        if area.is_empty() {
             return None;
         }
         let edge = |p: [f32; 2], q: [f32; 2]| {
-            let (dx, dy) = ((p[1] - q[1]) / area, (q[0] - p[0]) / area);
+            let (dx, dy) = ((p[1] - q[1]) / doubled, (q[0] - p[0]) / doubled);
             // Samples lie in the middle of their cell.
             [(0.5 - p[0]) * dx + (0.5 - p[1]) * dy, dx, dy]
         };
-        Some(Cover { columns, rows, stride: width, weights: [edge(b, c), edge(c, a), edge(a, b)] })
+        Some(Cover { area, stride: width, weights: [edge(b, c), edge(c, a), edge(a, b)] })
     }
 
     /// Calls `visit` with the index and the weights of each covered sample.
     pub fn each(&self, mut visit: impl FnMut(usize, [f32; 3])) {
-        for y in self.rows[0]..self.rows[1] {
+        for y in self.area.rows[0]..self.area.rows[1] {
             let start = self.weights.map(|[w, _, dy]| w + dy * y as f32);
-            let [mut first, mut end] = self.columns;
+            let [mut first, mut end] = self.area.columns;
             // Narrow the row to where all three weights can be positive; the test below decides at its ends.
             for (w, [_, dx, _]) in start.iter().zip(&self.weights) {
                 let root = -w / dx;

@@ -2,7 +2,7 @@
 
 use super::camera::Camera;
 use super::mesh::Mesh;
-use super::raster::{Cover, Rgb, Samples, light};
+use super::raster::{Area, Cover, Rgb, Samples, light};
 use nalgebra::{Isometry3, Vector3};
 
 /// How much of the table's brightness a full shadow takes.
@@ -10,40 +10,66 @@ const STRENGTH: f32 = 0.30;
 /// Blur radius as a share of the picture's width.
 const SOFTNESS: f32 = 0.007;
 
-/// How much of each pixel lies in shadow, 0..=1, row by row.
-pub fn mask(camera: &Camera, width: usize, height: usize, solids: &[(&Mesh, Isometry3<f64>, Rgb)]) -> Vec<f32> {
-    let light = light();
-    let mut mask = vec![0.0; width * height];
-    for (mesh, pose, _) in solids {
-        let flat: Vec<_> = mesh.placed(pose).map(|v| flatten(camera, &v.at, &light)).collect();
-        for triangle in &mesh.triangles {
-            if let [Some(a), Some(b), Some(c)] = triangle.map(|i| flat[i as usize]) {
-                // What faces away from the light flattens to a back and casts the same shadow as the rest.
-                if let Some(cover) = Cover::new([a, b, c], width, height) {
-                    cover.each(|i, _| mask[i] = 1.0);
+/// Smaller sums are rounding.
+const LEAST: f32 = 1e-4;
+
+/// How much of each pixel lies in shadow.
+pub struct Mask {
+    /// Where it may be more than 0.
+    pub area: Area,
+    /// 0..=1, row by row, of the whole picture.
+    values: Vec<f32>,
+    width: usize,
+}
+
+impl Mask {
+    /// The shadow of `solids` on a picture of `width` x `height` pixels.
+    pub fn new(camera: &Camera, width: usize, height: usize, solids: &[(&Mesh, Isometry3<f64>, Rgb)]) -> Self {
+        let light = light();
+        let (mut values, mut area) = (vec![0.0; width * height], Area::NONE);
+        for (mesh, pose, _) in solids {
+            let flat: Vec<_> = mesh.placed(pose).map(|v| flatten(camera, &v.at, &light)).collect();
+            for triangle in &mesh.triangles {
+                if let [Some(a), Some(b), Some(c)] = triangle.map(|i| flat[i as usize]) {
+                    // What faces away from the light flattens to a back and casts the same shadow as the rest.
+                    if let Some(cover) = Cover::new([a, b, c], width, height) {
+                        area = area.join(cover.area);
+                        cover.each(|i, _| values[i] = 1.0);
+                    }
                 }
             }
         }
+        if area.is_empty() {
+            return Mask { area: Area::all(0, 0), values, width };
+        }
+        let radius = (width as f32 * SOFTNESS).round() as usize;
+        let area = area.grown(2 * radius, width, height);
+        let mut scratch = vec![0.0; values.len()];
+        for _ in 0..2 {
+            blur(&values, &mut scratch, [area.columns, area.rows], [1, width], radius);
+            blur(&scratch, &mut values, [area.rows, area.columns], [width, 1], radius);
+        }
+        Mask { area, values, width }
     }
-    let radius = (width as f32 * SOFTNESS).round() as usize;
-    let mut scratch = vec![0.0; mask.len()];
-    for _ in 0..2 {
-        blur(&mask, &mut scratch, [width, height], [1, width], radius);
-        blur(&scratch, &mut mask, [height, width], [width, 1], radius);
-    }
-    mask
-}
 
-/// Darkens the samples with that tag, `zoom` x `zoom` of them a pixel.
-pub fn darken(picture: &mut Samples, mask: &[f32], zoom: usize, tag: u8) {
-    let width = picture.width;
-    for (y, row) in picture.color.chunks_exact_mut(width.max(1)).enumerate() {
-        for (x, sample) in row.iter_mut().enumerate() {
-            let shade = mask[y / zoom * (width / zoom) + x / zoom];
-            if shade > 0.0 && sample[3] == tag {
-                sample[..3].iter_mut().for_each(|v| *v = (f32::from(*v) * (1.0 - STRENGTH * shade)) as u8);
+    /// Darkens the samples with that tag, `zoom` x `zoom` of them a pixel.
+    pub fn darken(&self, picture: &mut Samples, zoom: usize, tag: u8) {
+        for y in self.area.rows[0]..self.area.rows[1] {
+            for x in self.area.columns[0]..self.area.columns[1] {
+                let light = 1.0 - STRENGTH * self.values[y * self.width + x];
+                let cells = (0..zoom * zoom).map(|k| (y * zoom + k / zoom) * picture.width + x * zoom + k % zoom);
+                for at in cells.filter(|_| light < 1.0) {
+                    let [r, g, b, drawn] = picture.color[at];
+                    if drawn == tag {
+                        let [r, g, b] = [r, g, b].map(|v| (f32::from(v) * light) as u8);
+                        picture.color[at] = [r, g, b, tag];
+                    }
+                }
             }
         }
+        let samples = |[first, end]: [usize; 2]| [first * zoom, end * zoom];
+        let area = Area { columns: samples(self.area.columns), rows: samples(self.area.rows) };
+        picture.drawn = picture.drawn.join(area);
     }
 }
 
@@ -53,21 +79,21 @@ fn flatten(camera: &Camera, at: &Vector3<f32>, light: &Vector3<f32>) -> Option<[
     camera.project(&on_table).map(|[x, y, _]| [x, y])
 }
 
-/// Running mean over `2 radius + 1` neighbours along one direction; `counts` and `strides` are along and across it.
-fn blur(from: &[f32], to: &mut [f32], counts: [usize; 2], strides: [usize; 2], radius: usize) {
-    let (length, width) = (counts[0], (2 * radius + 1) as f32);
-    for line in 0..counts[1] {
+/// Running mean over `2 radius + 1` neighbours along one direction; `spans` (first and end) and `strides` are along and across it.
+fn blur(from: &[f32], to: &mut [f32], spans: [[usize; 2]; 2], strides: [usize; 2], radius: usize) {
+    let ([first, end], width) = (spans[0], (2 * radius + 1) as f32);
+    for line in spans[1][0]..spans[1][1] {
         let at = |i: usize| line * strides[1] + i * strides[0];
-        // Counting in whole steps of the first blur keeps flat parts exactly flat; later rounding is far below a grey level.
-        let mut sum: f32 = (0..radius.min(length)).map(|i| from[at(i)]).sum();
-        for i in 0..length {
-            if i + radius < length {
+        let mut sum: f32 = (first..(first + radius).min(end)).map(|i| from[at(i)]).sum();
+        for i in first..end {
+            if i + radius < end {
                 sum += from[at(i + radius)];
             }
-            if i > radius {
+            if i > first + radius {
                 sum -= from[at(i - radius - 1)];
             }
-            to[at(i)] = if sum > 1e-4 { sum / width } else { 0.0 };
+            // What rounding leaves over outside of the shadow is no shadow.
+            to[at(i)] = if sum > LEAST { sum / width } else { 0.0 };
         }
     }
 }

@@ -27,7 +27,7 @@ pub fn write_png_sheet<W: Write>(episode: &Episode, columns: u32, rows: u32, siz
 fn sheet(episode: &Episode, columns: u32, rows: u32, size: (u32, u32)) -> RgbImage {
     let (width, height) = (columns * (size.0 + GAP_PX) - GAP_PX, rows * (size.1 + GAP_PX) - GAP_PX);
     let mut sheet = RgbImage { width, height, data: [255; 3].repeat(width as usize * height as usize) };
-    let renderer = Renderer::new(&episode.scene, size);
+    let mut renderer = Renderer::new(&episode.scene, size);
     let tiles = columns * rows;
     for tile in 0..tiles {
         // A single picture shows the end.
