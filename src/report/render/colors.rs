@@ -70,12 +70,12 @@ impl Palette {
 
     /// Index of the nearest entry.
     pub fn index(&mut self, rgb: Rgb) -> u8 {
-        let key = rgb.iter().fold(0, |key, v| key << BITS | usize::from(v >> (8 - BITS)));
+        let key = rgb.iter().fold(0, |key, v| (key << BITS) | usize::from(v >> (8 - BITS)));
         if let Some(index) = self.found[key] {
             return index;
         }
         // The middle of the cell, so that the answer does not depend on which of its colours came first.
-        let middle = rgb.map(|v| i32::from(v >> (8 - BITS) << (8 - BITS)) + (1 << (7 - BITS)));
+        let middle = rgb.map(|v| i32::from((v >> (8 - BITS)) << (8 - BITS)) + (1 << (7 - BITS)));
         // The eye tells green apart best, then red.
         let distance = |c: &Rgb| -> i32 { (0..3).map(|i| [3, 4, 2][i] * (middle[i] - i32::from(c[i])).pow(2)).sum() };
         let nearest = (0..self.colors.len()).min_by_key(|i| distance(&self.colors[*i])).unwrap_or(0) as u8;
@@ -94,7 +94,8 @@ mod tests {
         assert!(palette.colors.len() <= usize::from(UNCHANGED));
         assert_eq!(palette.bytes().len(), 768);
         for rgb in SHADED.into_iter().chain([BACKGROUND, TEXT, GOOD, BAD]) {
-            let found = palette.colors[usize::from(palette.index(rgb))];
+            let index = palette.index(rgb);
+            let found = palette.colors[usize::from(index)];
             assert!((0..3).all(|i| found[i].abs_diff(rgb[i]) <= 8), "{rgb:?} became {found:?}");
         }
     }

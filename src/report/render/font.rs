@@ -67,7 +67,7 @@ pub fn write(image: &mut RgbImage, text: &str, color: Rgb) {
         let Some((_, rows)) = GLYPHS.iter().find(|(c, _)| *c == letter) else { continue };
         let left = margin + n * ADVANCE * scale;
         for (y, x) in (0..HIGH * scale).flat_map(|y| (0..WIDE * scale).map(move |x| (y, x))) {
-            let set = rows[y / scale] >> (WIDE - 1 - x / scale) & 1 == 1;
+            let set = (rows[y / scale] >> (WIDE - 1 - x / scale)) & 1 == 1;
             let (column, row) = (left + x, top + y);
             if set && column < image.width as usize && row < image.height as usize {
                 let at = (row * image.width as usize + column) * 3;

@@ -184,8 +184,76 @@ fn table(camera: &Camera, width: usize, height: usize) -> Samples {
         let mesh = Mesh::cuboid(center, [half(TABLE_M[0]), half(TABLE_M[1]), (top_m - bottom_m) / 2.0]);
         samples.draw(camera, &mesh, &Translation3::identity().into(), Paint { rgb: colors::TABLE, opacity: 1.0, tag });
     };
-    layer(-TOP_LAYER_M, -TABLE_THICKNESS_M, 0);
     layer(0.0, -TOP_LAYER_M, TAG_TABLE);
+    layer(-TOP_LAYER_M, -TABLE_THICKNESS_M, 0);
     samples.drawn = Area::NONE;
     samples
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::demo::Contacts;
+    use crate::robot::READY_Q_RAD;
+    use crate::state::State;
+    use crate::tasks::Task;
+    use nalgebra::Vector3;
+
+    fn still(block: Pose, base: Pose) -> (Scene, Step) {
+        let context = Context::Base(base);
+        let scene = Scene { task: Task::Stack, block, context, obstacles: Vec::new(), friction: 1.0, block_mass_kg: 0.1 };
+        let step = Step {
+            state: State { q_rad: READY_Q_RAD, dq_rad_s: [0.0; JOINTS], block, context },
+            base_now: None,
+            commanded: [0.0; JOINTS],
+            executed: [0.0; JOINTS],
+            contacts: Contacts::default(),
+            block_speed_m_s: 0.0,
+            reward: 0.0,
+            conditions: Vec::new(),
+            phase: None,
+        };
+        (scene, step)
+    }
+
+    #[test]
+    fn blocks_show_their_colour_where_their_centres_project() {
+        let base = Pose::from_yaw([0.45, 0.27, 0.025], 0.0);
+        for (x, y) in [(0.40, -0.10), (0.50, 0.0), (0.60, 0.12)] {
+            let (scene, mut step) = still(Pose::from_yaw([x, y, 0.025], 0.4), base);
+            step.base_now = Some(Pose::from_yaw([0.36, 0.30, 0.025], 0.2));
+            let picture = Renderer::new(&scene, (480, 360)).draw(&step);
+            for (pose, rgb) in [(step.state.block, colors::BLOCK), (step.base_now.unwrap(), colors::BASE)] {
+                let at = Vector3::from(pose.position_m).cast();
+                let [column, row, _] = Camera::new(480, 360).project(&at).expect("before the camera");
+                let start = (row as usize * 480 + column as usize) * 3;
+                let seen = Vector3::from_fn(|i, _| f32::from(picture.data[start + i]));
+                let turn = seen.angle(&Vector3::from(rgb.map(f32::from)));
+                assert!(turn < 0.05, "{seen} instead of a shade of {rgb:?} at {pose:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_picture_does_not_depend_on_the_one_before() {
+        let (scene, step) = still(Pose::from_yaw([0.5, 0.0, 0.025], 0.0), Pose::from_yaw([0.45, 0.27, 0.025], 0.0));
+        let mut other = step.clone();
+        other.state.q_rad = READY_Q_RAD.map(|v| v + 0.3);
+        let mut renderer = Renderer::new(&scene, (160, 120));
+        let first = renderer.draw(&step);
+        assert_ne!(renderer.draw(&other), first);
+        assert_eq!(renderer.draw(&step), first);
+    }
+
+    #[test]
+    fn numbers_that_are_no_place_draw_nothing() {
+        let (scene, mut step) = still(Pose::from_yaw([0.5, 0.0, 0.025], 0.0), Pose::from_yaw([0.45, 0.27, 0.025], 0.0));
+        for wrong in [f64::NAN, f64::INFINITY, 1e30, -1e30] {
+            step.state.block.position_m = [wrong; 3];
+            step.state.q_rad = [wrong; JOINTS];
+            let (width, height) = (64, 48);
+            assert_eq!(Renderer::new(&scene, (width, height)).draw(&step).data.len(), (width * height * 3) as usize);
+        }
+        assert!(Renderer::new(&scene, (0, 0)).draw(&step).data.is_empty());
+    }
 }

@@ -130,12 +130,13 @@ impl Samples {
                 return;
             }
             self.depth[index] = depth;
-            let old = self.color[index];
-            let shade = |i: usize| {
-                let new = wa * a.rgb[i] + wb * b.rgb[i] + wc * c.rgb[i];
-                (f32::from(old[i]) + (new - f32::from(old[i])) * paint.opacity + 0.5) as u8
-            };
-            self.color[index] = [shade(0), shade(1), shade(2), paint.tag];
+            let mut new: [f32; 3] = std::array::from_fn(|i| wa * a.rgb[i] + wb * b.rgb[i] + wc * c.rgb[i]);
+            if paint.opacity < 1.0 {
+                let old = self.color[index];
+                (0..3).for_each(|i| new[i] = f32::from(old[i]) + (new[i] - f32::from(old[i])) * paint.opacity);
+            }
+            let [r, g, b] = new.map(|v| (v + 0.5) as u8);
+            self.color[index] = [r, g, b, paint.tag];
         });
     }
 }
@@ -199,7 +200,7 @@ impl Cover {
                 if *dx > 0.0 {
                     first = first.max(root.max(0.0) as usize);
                 } else if *dx < 0.0 {
-                    end = end.min(root.max(0.0) as usize + 2);
+                    end = end.min((root.max(0.0) as usize).saturating_add(2));
                 }
             }
             for x in first..end {

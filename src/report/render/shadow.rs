@@ -40,7 +40,7 @@ impl Mask {
             }
         }
         if area.is_empty() {
-            return Mask { area: Area::all(0, 0), values, width };
+            return Mask { area, values, width };
         }
         let radius = (width as f32 * SOFTNESS).round() as usize;
         let area = area.grown(2 * radius, width, height);
@@ -54,6 +54,9 @@ impl Mask {
 
     /// Darkens the samples with that tag, `zoom` x `zoom` of them a pixel.
     pub fn darken(&self, picture: &mut Samples, zoom: usize, tag: u8) {
+        if self.area.is_empty() {
+            return;
+        }
         for y in self.area.rows[0]..self.area.rows[1] {
             for x in self.area.columns[0]..self.area.columns[1] {
                 let light = 1.0 - STRENGTH * self.values[y * self.width + x];
