@@ -32,6 +32,8 @@ use world::{Block, World};
 
 /// Finger angle of the closed hand in a plan \[rad\]: a 5 cm cube stops the fingers at .98 to 1.01.
 pub const CLOSED_RAD: f64 = 0.98;
+/// Pieces of the fingers' way, fine enough for its short acceleration.
+const FINGER_SAMPLES: usize = 10;
 
 /// One sample of a plan.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -202,9 +204,13 @@ impl Planner {
 
     /// Fingers from where they are to `angle_rad`, the arm still.
     fn fingers(&self, phase: Phase, start: [f64; JOINTS], angle_rad: f64) -> Result<Piece, PlanError> {
-        let mut end = start;
-        end[ARM_JOINTS..].fill(angle_rad);
-        let q = self.smooth_path(&[start, end]).map_err(PlanError::Smoothing)?;
+        let path: Vec<[f64; JOINTS]> = (0..=FINGER_SAMPLES)
+            .map(|k| {
+                let share = k as f64 / FINGER_SAMPLES as f64;
+                std::array::from_fn(|j| if j < ARM_JOINTS { start[j] } else { start[j] + share * (angle_rad - start[j]) })
+            })
+            .collect();
+        let q = self.smooth_path(&path).map_err(PlanError::Smoothing)?;
         Ok(Piece { phase, q })
     }
 }
