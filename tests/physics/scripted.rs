@@ -30,6 +30,7 @@ pub struct Leg {
     pub steps: u32,
 }
 
+#[derive(Clone)]
 /// Goes through its legs and stays in the last.
 pub struct Script {
     arm: Arm,
@@ -41,7 +42,8 @@ pub struct Script {
 
 impl Script {
     /// Above the block, down, close, up.
-    pub fn lift(block: &Pose, yaw: f64) -> Self {
+    pub fn lift(block: &Pose) -> Self {
+        let yaw = block.isometry().rotation.euler_angles().2;
         let [x, y, z] = block.position_m;
         let low = z - 0.025 + GRASP_HEIGHT_M;
         let legs = vec![
@@ -54,8 +56,8 @@ impl Script {
     }
 
     /// [`Script::lift`], then to above `goal_m` (of the block's centre), down, open, up.
-    pub fn carry(block: &Pose, yaw: f64, goal_m: [f64; 3]) -> Self {
-        let mut script = Script::lift(block, yaw);
+    pub fn carry(block: &Pose, goal_m: [f64; 3]) -> Self {
+        let mut script = Script::lift(block);
         let [x, y, z] = goal_m;
         let low = z - 0.025 + GRASP_HEIGHT_M;
         script.legs.extend([
