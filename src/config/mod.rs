@@ -1,10 +1,12 @@
 //! Settings: one struct per stage, doc, default and unit beside each field; frozen after parsing.
 //! Precedence: defaults < pipeline file < `--set stage.key=value` < flags.
 
+mod choices;
 mod data;
 mod learn;
 mod scene;
 
+pub use choices::{ActionChoice, Alpha, Convergence, FeatureSet, ModelLoss, Objective, Pairs, StateScale, Structure};
 pub use data::{ConvertSettings, EvaluateSettings};
 pub use learn::{PretrainSettings, TrainSettings};
 pub use scene::{PlanSettings, PulseSettings, SceneSettings, SimulateSettings};
