@@ -43,18 +43,18 @@ impl Owner {
     }
 }
 
-/// Reads all contacts of the last physics step, which lasted `substep_s`.
+/// Reads all contacts of the last physics step.
 pub(super) fn read(physics: &PhysicsWorld) -> Contacts {
     let mut contacts = Contacts::default();
     for pair in physics.contact_pairs() {
         let [one, other] = [pair.collider1, pair.collider2].map(|h| &physics.colliders[h]);
-        let impulse = pair.total_impulse_magnitude();
-        if impulse <= 0.0 && separation(pair, one.position(), other.position()) > TOUCH_M {
+        if force_n(pair, physics) <= 0.0 && separation(pair, one.position(), other.position()) > TOUCH_M {
             continue;
         }
-        let force_n = f64::from(impulse / physics.integration_parameters.dt);
         match ordered(Owner::of(one), Owner::of(other)) {
-            (Owner::Link(link), Owner::Block) if link > HAND_LINK => contacts.finger_block_n[link - HAND_LINK - 1] += force_n,
+            (Owner::Link(link), Owner::Block) if link > HAND_LINK => {
+                contacts.finger_block_n[link - HAND_LINK - 1] += force_n(pair, physics)
+            }
             (Owner::Link(_), Owner::Obstacle) => contacts.robot_obstacle = true,
             (Owner::Link(_), Owner::Table) => contacts.robot_table = true,
             (Owner::Block, Owner::Table) => contacts.block_table = true,
@@ -63,6 +63,11 @@ pub(super) fn read(physics: &PhysicsWorld) -> Contacts {
         }
     }
     contacts
+}
+
+/// Normal force of the pair, mean over the last physics step \[N\].
+pub(super) fn force_n(pair: &ContactPair, physics: &PhysicsWorld) -> f64 {
+    f64::from(pair.total_impulse_magnitude() / physics.integration_parameters.dt)
 }
 
 /// Links first, then the block, then what stands still.

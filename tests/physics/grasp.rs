@@ -42,7 +42,6 @@ fn a_held_block_slips_less_than_a_millimetre_in_five_seconds() {
             world.step(&script.command(&seen));
         }
         let slip = distance(&before, &in_hand(&world.observe()));
-        println!("slip {slip}");
         assert!(slip < 1e-3, "position {index}: slipped {slip} m");
     }
 }
@@ -64,7 +63,6 @@ fn a_placed_block_rests_and_a_stacked_block_stays() {
                 world.step(&[0.0; 9]);
             }
             let moved = distance(&then.state.block, &world.observe().state.block);
-            println!("{task} moved {moved} error {error}");
             assert!(moved < 1e-4, "{task} {index}: moved {moved} m in 2 s");
         }
     }

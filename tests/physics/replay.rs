@@ -70,12 +70,20 @@ fn a_snapshot_continues_bit_for_bit() {
     for index in 0..3 {
         let (mut world, mut script) = mid_carry(Task::Stack, index);
         let bytes = world.snapshot();
-        println!("snapshot {} bytes", bytes.len());
         let mut restored = World::restore(&bytes).expect("a snapshot");
         let mut twin = script.clone();
         let (one, other) = (future(&mut world, &mut script, 150), future(&mut restored, &mut twin, 150));
         assert!(one == other, "world {index} continues differently after a snapshot");
     }
+}
+
+#[test]
+fn a_world_can_move_to_another_thread() {
+    let (mut world, mut script) = mid_carry(Task::PickAndPlace, 0);
+    let mut restored = World::restore(&world.snapshot()).expect("a snapshot");
+    let mut twin = script.clone();
+    let there = std::thread::spawn(move || future(&mut restored, &mut twin, 40)).join().expect("the thread ran");
+    assert!(there == future(&mut world, &mut script, 40));
 }
 
 #[test]
@@ -111,7 +119,6 @@ fn a_recorded_state_can_be_set_exactly() {
             set.step(&twin.command(&b));
         }
         let apart = distance(&world.observe().state.block, &set.observe().state.block);
-        println!("{task} apart {apart}");
         assert!(apart < 3e-3, "{task}: block {apart} m away from the recorded future after 1 s");
         assert!(set.observe().gripped(), "{task}: dropped after setting the state");
     }

@@ -30,8 +30,8 @@ pub struct Leg {
     pub steps: u32,
 }
 
-#[derive(Clone)]
 /// Goes through its legs and stays in the last.
+#[derive(Clone)]
 pub struct Script {
     arm: Arm,
     yaw: f64,
