@@ -44,3 +44,10 @@ fn scratch() {
         );
     }
 }
+#[test]
+fn single() {
+    let mut planner = Planner::new(&PlanSettings::default());
+    for k in 0..300u64 {
+        let _ = plan(&mut planner, Task::Stack, k);
+    }
+}

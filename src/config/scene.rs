@@ -45,7 +45,7 @@ pub struct PlanSettings {
     pub episodes: u64,
     /// Fraction of the joints' velocity limits that plans may use (0..1].
     pub speed: f64,
-    /// Largest joint acceleration in a plan \[rad/s^2\].
+    /// Largest acceleration of an arm joint in a plan \[rad/s^2\]: full planned speed within 0.2 s.
     pub max_acceleration_rad_s2: f64,
     /// Iterations of the path search before a transit counts as blocked.
     pub search_iterations: usize,
@@ -58,7 +58,7 @@ impl Default for PlanSettings {
         PlanSettings {
             episodes: 200,
             speed: 0.8,
-            max_acceleration_rad_s2: 2.0,
+            max_acceleration_rad_s2: 3.0,
             search_iterations: 5000,
             shortcut_iterations: 100,
         }

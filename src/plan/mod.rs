@@ -27,7 +27,7 @@ use crate::state::{ARM_JOINTS, CONTROL_DT_S, JOINTS};
 use grasp::{CARRY_RISE_M, PREGRASP_RISE_M, RETREAT_RISE_M, grasps, raised, ready, releases};
 use path::{Knot, tool_pose};
 use rand::Rng;
-use transit::Leg;
+use transit::{Leg, smooth_path};
 use world::{Block, World};
 
 /// Finger angle of the closed hand in a plan \[rad\]: a 5 cm cube stops the fingers at .98 to 1.01.
@@ -88,12 +88,15 @@ pub struct Planner {
     settings: PlanSettings,
     limits: Limits,
     ik: Ik,
+    /// See [`closing`].
+    closing: Vec<f64>,
 }
 
 impl Planner {
     /// A planner with these settings.
     pub fn new(settings: &PlanSettings) -> Self {
-        Planner { settings: settings.clone(), limits: Limits::new(settings), ik: Ik::new() }
+        let limits = Limits::new(settings);
+        Planner { settings: settings.clone(), limits, ik: Ik::new(), closing: closing(&limits) }
     }
 
     /// Plans one demonstration of `scene`; `index` goes into the plan, `rng` is used only where a search is needed.
@@ -147,7 +150,7 @@ impl Planner {
             start: READY_Q_RAD,
         };
         let q = self.transit(world, &leg, rng)?;
-        let closing = self.fingers(Phase::Close, q[q.len() - 1], CLOSED_RAD)?;
+        let closing = Self::fingers(Phase::Close, &self.closing, &q[q.len() - 1]);
         Ok(vec![Piece { phase: Phase::Approach, q }, closing])
     }
 
@@ -176,7 +179,8 @@ impl Planner {
         world.check(&q, &block, CLEARANCE_M).map_err(|why| PlanError::Grasp(format!("with the block at its target, {why}")))?;
         let leg = Leg { phase: Phase::Carry, before: vec![*grasp], from: lifted, to: above, after: vec![release], block, start };
         pieces.push(Piece { phase: Phase::Carry, q: self.transit(world, &leg, rng)? });
-        pieces.push(self.fingers(Phase::Open, end_of(&pieces), PRESHAPE_RAD)?);
+        let opening: Vec<f64> = self.closing.iter().rev().copied().collect();
+        pieces.push(Self::fingers(Phase::Open, &opening, &end_of(&pieces)));
         let block = Block::Free(tool_pose(&release) * in_tool);
         let up = raised(&release, RETREAT_RISE_M);
         let leg = Leg {
@@ -202,17 +206,23 @@ impl Planner {
         })
     }
 
-    /// Fingers from where they are to `angle_rad`, the arm still.
-    fn fingers(&self, phase: Phase, start: [f64; JOINTS], angle_rad: f64) -> Result<Piece, PlanError> {
-        let path: Vec<[f64; JOINTS]> = (0..=FINGER_SAMPLES)
-            .map(|k| {
-                let share = k as f64 / FINGER_SAMPLES as f64;
-                std::array::from_fn(|j| if j < ARM_JOINTS { start[j] } else { start[j] + share * (angle_rad - start[j]) })
-            })
-            .collect();
-        let q = self.smooth_path(&path).map_err(PlanError::Smoothing)?;
-        Ok(Piece { phase, q })
+    /// Fingers follow `angles`, the arm still.
+    fn fingers(phase: Phase, angles: &[f64], arm: &[f64; JOINTS]) -> Piece {
+        let at = |angle: &f64| std::array::from_fn(|j| if j < ARM_JOINTS { arm[j] } else { *angle });
+        Piece { phase, q: angles.iter().map(at).collect() }
     }
+}
+
+/// Angles of a finger that closes from the open hand, at the control rate \[rad\]; backwards, it opens.
+fn closing(limits: &Limits) -> Vec<f64> {
+    let path: Vec<[f64; JOINTS]> = (0..=FINGER_SAMPLES)
+        .map(|k| {
+            let angle = PRESHAPE_RAD + (CLOSED_RAD - PRESHAPE_RAD) * k as f64 / FINGER_SAMPLES as f64;
+            std::array::from_fn(|j| if j < ARM_JOINTS { READY_Q_RAD[j] } else { angle })
+        })
+        .collect();
+    let samples = smooth_path(&path, limits).expect("the fingers' limits are constants that leave room");
+    samples.iter().map(|q| q[ARM_JOINTS]).collect()
 }
 
 /// The samples of one phase, both ends included.

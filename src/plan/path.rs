@@ -10,7 +10,7 @@ pub(super) type Knot = Vector4<f64>;
 /// How far a radian of yaw counts against a metre \[m/rad\].
 pub(super) const YAW_LEVER_M: f64 = 0.15;
 /// Distance between samples of a path \[m\]: joint angles are interpolated in between, off by less than 0.1 mm.
-const SAMPLE_M: f64 = 0.02;
+const SAMPLE_M: f64 = 0.025;
 /// Points on a rounded corner.
 const CORNER_POINTS: usize = 8;
 

@@ -20,6 +20,12 @@ const FINGER_ACCELERATION_RAD_S2: f64 = 8.0;
 const TIGHT: f64 = 1.0 - 1e-5;
 /// A joint that moves less than this over a piece keeps its place \[rad\].
 const STILL_RAD: f64 = 1e-7;
+/// Duality gap of a solution: the path's shape matters to a few micrometres, the limits are held by the feasibility tolerance.
+const GAP: f64 = 1e-6;
+/// Residual at which the solver stops refining its linear systems: the default refines to rounding, at a third of the time.
+const REFINEMENT: f64 = 1e-9;
+/// Joints that stay this far inside their position limits need no rows for them \[rad\]; smoothing moves a joint by far less.
+const NEAR_LIMIT_RAD: f64 = 0.1;
 /// Third difference.
 const JERK: [f64; 4] = [-1.0, 3.0, -3.0, 1.0];
 
@@ -56,15 +62,19 @@ pub(super) fn smooth(samples: &[Q], limits: &Limits) -> Option<Vec<Q>> {
     if last < 2 {
         return Some(smoothed);
     }
+    let near_limit = (0..JOINTS).any(|j| {
+        let [low, high] = POSITION_LIMITS_RAD[j];
+        samples.iter().any(|q| q[j] < low + NEAR_LIMIT_RAD || q[j] > high - NEAR_LIMIT_RAD)
+    });
     let mut program = None;
     for j in 0..JOINTS {
         let path: Vec<f64> = samples.iter().map(|q| q[j]).collect();
         if path.iter().all(|q| (q - path[0]).abs() < STILL_RAD) {
             continue;
         }
-        let (slope, bounds) = (slope(&path), bounds(&path, j, limits));
+        let (slope, bounds) = (slope(&path), bounds(&path, j, limits, near_limit));
         let solver = match &mut program {
-            None => program.insert(build(last - 1, &slope, &bounds)),
+            None => program.insert(build(last - 1, &slope, &bounds, near_limit)),
             Some(solver) => {
                 let untouched: [f64; 0] = [];
                 solver
@@ -108,8 +118,8 @@ fn slope(path: &[f64]) -> Vec<f64> {
     slope
 }
 
-/// Right-hand sides, in the order of the rows of [`build`]: room above, then room below, for velocity, acceleration and position.
-fn bounds(path: &[f64], j: usize, limits: &Limits) -> Vec<f64> {
+/// Right-hand sides, in the order of the rows of [`build`]: room above, then room below, for velocity, acceleration and (if asked) position.
+fn bounds(path: &[f64], j: usize, limits: &Limits, near_limit: bool) -> Vec<f64> {
     let last = path.len() as isize - 1;
     let step = TIGHT * limits.velocity_rad_s[j] * CONTROL_DT_S;
     let bend = TIGHT * limits.acceleration_rad_s2[j] * CONTROL_DT_S.powi(2);
@@ -117,12 +127,14 @@ fn bounds(path: &[f64], j: usize, limits: &Limits) -> Vec<f64> {
     let mut room: Vec<[f64; 2]> = Vec::with_capacity(3 * path.len());
     room.extend((0..last).map(|k| at(path, k + 1) - at(path, k)).map(|d| [step - d, step + d]));
     room.extend((0..=last).map(|k| at(path, k + 1) - 2.0 * at(path, k) + at(path, k - 1)).map(|d| [bend - d, bend + d]));
-    room.extend((1..last).map(|k| at(path, k)).map(|q| [high - q, q - low]));
+    if near_limit {
+        room.extend((1..last).map(|k| at(path, k)).map(|q| [high - q, q - low]));
+    }
     room.iter().map(|r| r[0]).chain(room.iter().map(|r| r[1])).collect()
 }
 
 /// The program for `free` samples between two pinned ones.
-fn build(free: usize, slope: &[f64], bounds: &[f64]) -> DefaultSolver<f64> {
+fn build(free: usize, slope: &[f64], bounds: &[f64], near_limit: bool) -> DefaultSolver<f64> {
     let mut columns: Vec<Vec<(usize, f64)>> = vec![Vec::new(); free];
     let mut rows = 0;
     let mut row = |first: isize, coefficients: &[f64]| {
@@ -137,13 +149,24 @@ fn build(free: usize, slope: &[f64], bounds: &[f64]) -> DefaultSolver<f64> {
     let last = free as isize + 1;
     (0..last).for_each(|k| row(k, &[-1.0, 1.0]));
     (0..=last).for_each(|k| row(k - 1, &[1.0, -2.0, 1.0]));
-    (1..last).for_each(|k| row(k, &[1.0]));
+    if near_limit {
+        (1..last).for_each(|k| row(k, &[1.0]));
+    }
     let mirrored = columns.iter().map(|column| {
         let below = column.iter().map(|(r, v)| (r + rows, -v));
         column.iter().copied().chain(below).collect::<Vec<_>>()
     });
     let constraints = sparse(2 * rows, mirrored.collect());
-    let settings = DefaultSettings { verbose: false, max_threads: 1, presolve_enable: false, ..DefaultSettings::default() };
+    let settings = DefaultSettings {
+        verbose: false,
+        max_threads: 1,
+        presolve_enable: false,
+        tol_gap_abs: GAP,
+        tol_gap_rel: GAP,
+        iterative_refinement_reltol: REFINEMENT,
+        iterative_refinement_abstol: REFINEMENT,
+        ..DefaultSettings::default()
+    };
     DefaultSolver::new(&cost(free), slope, &constraints, bounds, &[SupportedConeT::NonnegativeConeT(2 * rows)], settings)
         .expect("a program of matching sizes")
 }

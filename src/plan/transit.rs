@@ -3,7 +3,7 @@
 use super::grasp::raised;
 use super::path::{Knot, follow};
 use super::search::Search;
-use super::smooth::smooth;
+use super::smooth::{Limits, smooth};
 use super::timing::time;
 use super::world::{Block, CLEARANCE_M, SEARCH_CLEARANCE_M, World};
 use super::{PlanError, Planner};
@@ -92,19 +92,9 @@ impl Planner {
             clear(world, &path, &leg.block, SEARCH_CLEARANCE_M).map_err(transit)?;
         }
         let smoothing = |why: String| PlanError::Smoothing(format!("{}: {why}", leg.phase.name()));
-        let samples = self.smooth_path(&path).map_err(smoothing)?;
+        let samples = smooth_path(&path, &self.limits).map_err(smoothing)?;
         clear(world, &samples, &leg.block, CLEARANCE_M).map_err(smoothing)?;
         Ok(samples)
-    }
-
-    /// Times and smooths a joint path; slower when that is what the limits ask for.
-    pub(super) fn smooth_path(&self, path: &[[f64; JOINTS]]) -> Result<Vec<[f64; JOINTS]>, String> {
-        (0..SMOOTH_ATTEMPTS)
-            .find_map(|attempt| smooth(&time(path, &self.limits, STRETCH.powi(attempt)), &self.limits))
-            .ok_or_else(|| {
-                let slowest = STRETCH.powi(SMOOTH_ATTEMPTS - 1);
-                format!("no trajectory within the limits, even {slowest:.1} times slower; raise plan.max_acceleration_rad_s2 or lower plan.speed")
-            })
     }
 
     fn search(&mut self, world: &World, leg: &Leg, rng: &mut impl Rng) -> Result<Vec<Knot>, String> {
@@ -121,6 +111,14 @@ impl Planner {
             format!("no other way was found in {iterations} iterations; raise plan.search_iterations or move the obstacles")
         })
     }
+}
+
+/// Times and smooths a joint path; slower when that is what the limits ask for.
+pub(super) fn smooth_path(path: &[[f64; JOINTS]], limits: &Limits) -> Result<Vec<[f64; JOINTS]>, String> {
+    (0..SMOOTH_ATTEMPTS).find_map(|attempt| smooth(&time(path, limits, STRETCH.powi(attempt)), limits)).ok_or_else(|| {
+        let slowest = STRETCH.powi(SMOOTH_ATTEMPTS - 1);
+        format!("no trajectory within the limits, even {slowest:.1} times slower; raise plan.max_acceleration_rad_s2 or lower plan.speed")
+    })
 }
 
 /// Checks a joint path at the resolution of the collision check.

@@ -24,6 +24,8 @@ const POSTURE_FLOOR: f64 = 1e-9;
 const CONVERGED_RAD: f64 = 1e-3;
 /// Steps before a target counts as unreachable; the whole workspace is within 20 steps of the ready posture.
 const MAX_STEPS: usize = 60;
+/// Residual at which the solver stops refining its linear systems; the steps correct each other.
+const REFINEMENT: f64 = 1e-9;
 /// Position error of a solution \[m\].
 pub const POSITION_TOLERANCE_M: f64 = 1e-4;
 /// Rotation error of a solution \[rad\].
@@ -63,6 +65,8 @@ impl Ik {
             verbose: false,
             max_threads: 1,
             presolve_enable: false,
+            iterative_refinement_reltol: REFINEMENT,
+            iterative_refinement_abstol: REFINEMENT,
             equilibrate_enable: false,
             ..DefaultSettings::default()
         };
