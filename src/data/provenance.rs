@@ -47,13 +47,12 @@ impl Provenance {
         }
     }
 
-    /// Adds a file or directory that the stage reads, under its own name.
+    /// Adds a file or directory that the stage reads, under a name that is the same everywhere ("dataset/train").
     ///
     /// # Errors
     /// See [`hash_path`].
-    pub fn with_input(mut self, path: &Path) -> Result<Self> {
-        let name = path.file_name().map_or_else(String::new, |n| n.to_string_lossy().into_owned());
-        self.inputs.insert(name, hash_path(path)?);
+    pub fn with_input(mut self, name: &str, path: &Path) -> Result<Self> {
+        self.inputs.insert(name.into(), hash_path(path)?);
         Ok(self)
     }
 

@@ -4,6 +4,7 @@ mod datasets;
 mod fixtures;
 mod interop;
 mod limits;
+mod viewers;
 
 use fixtures::{episode, provenance, table, tensors};
 use hilt::data::{hash_path, inspect, inspect_text, json_file, recording, table_file, weights};
@@ -16,6 +17,9 @@ use std::path::Path;
 use tempfile::tempdir;
 
 const URDF: &str = "<robot name=\"j2n6s300\"/>";
+
+/// Places at which a file is cut and changed, beside its last bytes.
+const PLACES: usize = 80;
 
 /// Cuts a file at many lengths and flips a bit at many places: `read` must refuse each, naming the file.
 pub fn refuses_damage<T>(path: &Path, read: impl Fn() -> Result<T>) {
@@ -30,7 +34,7 @@ pub fn refuses_damage<T>(path: &Path, read: impl Fn() -> Result<T>) {
             Err(other) => panic!("{what}: {other}"),
         }
     };
-    let stride = (whole.len() / 150).max(1);
+    let stride = (whole.len() / PLACES).max(1);
     for at in (0..whole.len()).step_by(stride).chain(whole.len().saturating_sub(40)..whole.len()) {
         check(format!("cut at {at} of {}", whole.len()), &whole[..at]);
         let mut bytes = whole.clone();
