@@ -1,0 +1,71 @@
+//! What viewers get out of a recording: frames that add up, times of the simulation, the scene once, the robot attached.
+
+use crate::fixtures::{episode, provenance};
+use foxglove::messages::{FrameTransforms, JointStates, SceneUpdate};
+use hilt::data::recording::{self, BASE_FRAME, BLOCK_FRAME, URDF_NAME, WORLD_FRAME};
+use hilt::robot::Arm;
+use hilt::robot::jaco::LINK_NAMES;
+use hilt::state::{CONTROL_HZ, JOINT_NAMES};
+use hilt::tasks::Task;
+use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion};
+use prost::Message;
+use std::collections::BTreeMap;
+use std::fs;
+use tempfile::tempdir;
+
+/// `world_from_frame` through the chain of parents.
+fn world_from(frame: &str, transforms: &FrameTransforms) -> Isometry3<f64> {
+    if frame == WORLD_FRAME {
+        return Isometry3::identity();
+    }
+    let found = transforms.transforms.iter().find(|t| t.child_frame_id == frame).expect("the frame is known");
+    let (at, turn) = (found.translation.as_ref().expect("set"), found.rotation.as_ref().expect("set"));
+    let rotation = UnitQuaternion::from_quaternion(Quaternion::new(turn.w, turn.x, turn.y, turn.z));
+    world_from(&found.parent_frame_id, transforms) * Isometry3::from_parts(Translation3::new(at.x, at.y, at.z), rotation)
+}
+
+#[test]
+fn transforms_add_up_to_the_kinematics_at_simulated_times() {
+    let dir = tempdir().expect("dir");
+    let path = dir.path().join("episode.mcap");
+    let made = episode(Task::Stack, 1, 8);
+    recording::write(&path, &made, "<robot/>", &provenance("simulate", Task::Stack)).expect("written");
+    let bytes = fs::read(&path).expect("bytes");
+    let moments: Vec<_> = made.steps.iter().chain([&made.last]).collect();
+    let mut seen: BTreeMap<String, usize> = BTreeMap::new();
+    for message in mcap::MessageStream::new(&bytes).expect("stream") {
+        let message = message.expect("message");
+        let t = seen.entry(message.channel.topic.clone()).or_default();
+        match message.channel.topic.as_str() {
+            "/tf" => {
+                let transforms = FrameTransforms::decode(&message.data[..]).expect("transforms");
+                assert_eq!(message.log_time, *t as u64 * 1_000_000_000 / u64::from(CONTROL_HZ));
+                let expected = Arm::new().link_poses(&moments[*t].state.q_rad);
+                for (name, pose) in LINK_NAMES.iter().zip(expected) {
+                    let error = world_from(name, &transforms).inverse() * pose;
+                    assert!(error.translation.vector.norm() < 1e-9 && error.rotation.angle() < 1e-7, "{name} at {t}");
+                }
+                let block = world_from(BLOCK_FRAME, &transforms).translation.vector;
+                assert_eq!(<[f64; 3]>::from(block), moments[*t].state.block.position_m);
+                world_from(BASE_FRAME, &transforms);
+            }
+            "/joint_states" => {
+                let joints = JointStates::decode(&message.data[..]).expect("joints").joints;
+                assert!(joints.iter().map(|j| j.name.as_str()).eq(JOINT_NAMES));
+                assert!(joints.iter().zip(moments[*t].state.q_rad).all(|(j, q)| j.position == Some(q)));
+            }
+            "/scene" => {
+                let entities = SceneUpdate::decode(&message.data[..]).expect("scene").entities;
+                let ids: Vec<&str> = entities.iter().map(|e| e.id.as_str()).collect();
+                assert_eq!(ids, ["table", "block", "base_block", "obstacles"]);
+            }
+            _ => {}
+        }
+        *t += 1;
+    }
+    let counts: Vec<usize> = ["/tf", "/joint_states", "/scene", "/hilt/step"].map(|topic| seen[topic]).into();
+    assert_eq!(counts, [9, 9, 1, 9]);
+    let summary = mcap::Summary::read(&bytes).expect("summary").expect("a finished file");
+    let attached = mcap::read::attachment(&bytes, &summary.attachment_indexes[0]).expect("attachment");
+    assert_eq!((attached.name.as_str(), &attached.data[..]), (URDF_NAME, &b"<robot/>"[..]));
+}
