@@ -36,12 +36,13 @@ struct Model {
     work: Regression,
 }
 
-/// See the module.
-pub(super) struct Learner {
-    pub seed: u64,
-    pub corpus: Corpus,
+/// A policy under training. One update of Algorithm 1 is [`Learner::behavior_cloning`], [`Learner::state_cloning`],
+/// [`Learner::update`] and [`Learner::fine_tune`] on the same demos.
+pub struct Learner {
+    pub(super) seed: u64,
+    pub(super) corpus: Corpus,
     /// Updates of the present stage.
-    pub updates: u64,
+    pub(super) updates: u64,
     skipped: u64,
     settings: TrainSettings,
     policy: Policy,
@@ -65,6 +66,10 @@ pub(super) struct Learner {
 }
 
 impl Learner {
+    /// Networks, statistics and inputs for these demos.
+    ///
+    /// # Errors
+    /// [`Error::Failed`] without demos or when tasks differ.
     pub fn new(
         train: &[Demo],
         validation: &[Demo],
@@ -134,7 +139,27 @@ impl Learner {
         self.policy.log_std.copy_from_slice(self.std_descent.ema.average());
     }
 
+    /// Transitions of some training demos, one after another.
+    pub fn rows_of(&self, demos: &[usize]) -> Vec<usize> {
+        self.corpus.rows_of(demos)
+    }
+
+    /// Floating point operations of the matrix products of one update on `rows` transitions, `first` of which begin a segment.
+    pub fn flops_per_update(&self, rows: u64, first: u64) -> u64 {
+        let policy = self.policy.net.flops_per_row();
+        let model = self.model.as_ref().map_or(0, |m| m.dynamics.net.flops_per_row());
+        3 * policy * (2 * rows - first) + (2 + 3) * model * rows
+    }
+
+    /// Segments of the last [`Learner::state_cloning`].
+    pub fn segments(&self) -> &[Segment] {
+        &self.segments
+    }
+
     /// Algorithm 2 on transitions that amount to `demos` demos.
+    ///
+    /// # Errors
+    /// [`Error::Failed`] when L_BC is not a number.
     pub fn behavior_cloning(&mut self, rows: &[usize], demos: f64) -> Result<Cloned> {
         self.draws += 1;
         let mut rng = stream(self.seed, "train.bc", self.draws);
@@ -145,6 +170,9 @@ impl Learner {
     }
 
     /// Algorithm 3 on `demos`, whose transitions are `rows`; after [`Learner::behavior_cloning`] on the same.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] without a dynamics network, [`Error::Failed`] when L_SC is not a number.
     pub fn state_cloning(&mut self, demos: &[usize], rows: &[usize]) -> Result<f64> {
         let Some(model) = &self.model else {
             return Err(Error::Usage("state cloning needs a dynamics network: run `hilt pretrain` first".into()));
@@ -216,6 +244,9 @@ impl Learner {
     }
 
     /// One update of the dynamics network on observed transitions (Eq. 6); L_mix never reaches it.
+    ///
+    /// # Errors
+    /// [`Error::Failed`] when the loss is not a number.
     pub fn fine_tune(&mut self, rows: &[usize]) -> Result<f64> {
         let mean_length = self.mean_length() as f32;
         let Some(Model { dynamics, samples, adam, work, .. }) = &mut self.model else {
