@@ -71,9 +71,9 @@ impl Hand {
     }
 }
 
-/// pi / 2 in two parts, so that x - n pi / 2 keeps its digits.
-const HALF_PI_HIGH: f32 = 1.570_796_4;
-const HALF_PI_LOW: f32 = -4.371_139e-8;
+/// pi / 2 in two parts: the first has few digits, so that its product with a number of quarter turns is exact.
+const HALF_PI_HIGH: f32 = 1.570_312_5;
+const HALF_PI_LOW: f32 = 4.838_268e-4;
 
 /// Sine and cosine to about 2e-7 for |x| up to a few dozen turns; the same bytes on every platform, unlike the system's.
 pub fn sin_cos(x: f32) -> (f32, f32) {

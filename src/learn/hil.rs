@@ -132,7 +132,7 @@ fn hybrid_imitation_learning(
         let mut metrics = EpochMetrics::new("hil", epoch + 1, settings.epochs);
         for (i, demos) in order.chunks(batch).enumerate() {
             interrupt.check()?;
-            let rows = learner.corpus.rows_of(demos);
+            let rows = learner.rows_of(demos);
             let cloned = learner.behavior_cloning(&rows, demos.len() as f64)?; // Algorithm 2, Eq. 3-4
             let alpha = mixing.weight(cloned.d_conv); // alpha_e = d_conv, no gradient through it
             let sc = if alpha > 0.0 { learner.state_cloning(demos, &rows)? } else { f64::NAN }; // Algorithm 3, Eq. 5

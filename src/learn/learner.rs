@@ -36,12 +36,13 @@ struct Model {
     work: Regression,
 }
 
-/// See the module.
-pub(super) struct Learner {
-    pub seed: u64,
-    pub corpus: Corpus,
+/// A policy under training. One update of Algorithm 1 is [`Learner::behavior_cloning`], [`Learner::state_cloning`],
+/// [`Learner::update`] and [`Learner::fine_tune`] on the same demos.
+pub struct Learner {
+    pub(super) seed: u64,
+    pub(super) corpus: Corpus,
     /// Updates of the present stage.
-    pub updates: u64,
+    pub(super) updates: u64,
     skipped: u64,
     settings: TrainSettings,
     policy: Policy,
@@ -65,6 +66,10 @@ pub(super) struct Learner {
 }
 
 impl Learner {
+    /// Networks, statistics and inputs for these demos.
+    ///
+    /// # Errors
+    /// [`Error::Failed`] without demos or when tasks differ.
     pub fn new(
         train: &[Demo],
         validation: &[Demo],
@@ -134,7 +139,38 @@ impl Learner {
         self.policy.log_std.copy_from_slice(self.std_descent.ema.average());
     }
 
+    /// Transitions of some training demos, one after another.
+    pub fn rows_of(&self, demos: &[usize]) -> Vec<usize> {
+        self.corpus.rows_of(demos)
+    }
+
+    /// Floating point operations of the matrix products of one update of behavior cloning alone on `rows` transitions.
+    pub fn bc_flops_per_update(&self, rows: u64) -> u64 {
+        let net = &self.policy.net;
+        // forward, weights' gradient, and inputs' gradient, which the first layer does not need
+        rows * (3 * net.flops_per_row() - net.first_layer_flops_per_row())
+    }
+
+    /// Floating point operations of the matrix products of one update of Algorithm 1 on `rows` transitions in `segments` segments.
+    pub fn flops_per_update(&self, rows: u64, segments: u64) -> u64 {
+        let later = 3 * self.policy.net.flops_per_row() * (rows - segments);
+        let model = self.model.as_ref().map_or(0, |model| {
+            let net = &model.dynamics.net;
+            // rollout: forward and inputs' gradient; fine-tuning: as behavior cloning
+            rows * (5 * net.flops_per_row() - net.first_layer_flops_per_row())
+        });
+        self.bc_flops_per_update(rows) + later + model
+    }
+
+    /// Segments of the last [`Learner::state_cloning`].
+    pub fn segments(&self) -> &[Segment] {
+        &self.segments
+    }
+
     /// Algorithm 2 on transitions that amount to `demos` demos.
+    ///
+    /// # Errors
+    /// [`Error::Failed`] when L_BC is not a number.
     pub fn behavior_cloning(&mut self, rows: &[usize], demos: f64) -> Result<Cloned> {
         self.draws += 1;
         let mut rng = stream(self.seed, "train.bc", self.draws);
@@ -145,6 +181,9 @@ impl Learner {
     }
 
     /// Algorithm 3 on `demos`, whose transitions are `rows`; after [`Learner::behavior_cloning`] on the same.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] without a dynamics network, [`Error::Failed`] when L_SC is not a number.
     pub fn state_cloning(&mut self, demos: &[usize], rows: &[usize]) -> Result<f64> {
         let Some(model) = &self.model else {
             return Err(Error::Usage("state cloning needs a dynamics network: run `hilt pretrain` first".into()));
@@ -216,6 +255,9 @@ impl Learner {
     }
 
     /// One update of the dynamics network on observed transitions (Eq. 6); L_mix never reaches it.
+    ///
+    /// # Errors
+    /// [`Error::Failed`] when the loss is not a number.
     pub fn fine_tune(&mut self, rows: &[usize]) -> Result<f64> {
         let mean_length = self.mean_length() as f32;
         let Some(Model { dynamics, samples, adam, work, .. }) = &mut self.model else {

@@ -4,6 +4,8 @@ pub mod behavior_cloning;
 mod corpus;
 mod dynamics;
 mod features;
+#[cfg(test)]
+mod gradient_tests;
 mod hand;
 pub mod hil;
 mod learner;
@@ -18,11 +20,14 @@ mod shards;
 pub mod state_cloning;
 #[cfg(test)]
 mod testing;
+#[cfg(test)]
+mod training_tests;
 mod weights;
 
 pub use dynamics::Dynamics;
 pub use features::Features;
 pub use hil::{Method, Trained, train};
+pub use learner::Learner;
 pub use metrics::EpochMetrics;
 pub use model_report::ModelReport;
 pub use policy::Policy;

@@ -136,6 +136,11 @@ impl Mlp {
         (0..self.layers()).map(|layer| self.shape(layer, &(0..1)).flops()).sum()
     }
 
+    /// The first layer's share of [`Mlp::flops_per_row`].
+    pub fn first_layer_flops_per_row(&self) -> u64 {
+        self.shape(0, &(0..1)).flops()
+    }
+
     /// `pass.output` of `rows` from `pass.input`.
     pub fn forward(&self, pass: &mut Pass, rows: Range<usize>) {
         for layer in 0..self.layers() {

@@ -1,0 +1,284 @@
+//! Losses of Algorithms 2 and 3 against finite differences, and the batched segments against Algorithm 3 step by step.
+
+use super::behavior_cloning::{self as bc, behavior_cloning, policy_gradient};
+use super::corpus::{Corpus, Samples, row};
+use super::dynamics::Dynamics;
+use super::policy::Policy;
+use super::shards::add_scaled;
+use super::state_cloning::{self as sc, Segment, draw_segments, state_cloning};
+use super::testing::demos;
+use crate::config::{ActionChoice, FeatureSet, Objective, Pairs, PretrainSettings, StateScale, Structure, TrainSettings};
+use crate::nn::{Activation, Pass};
+use crate::seed::stream;
+use crate::state::{BASE_DIM, JOINTS};
+use crate::tasks::Task;
+use rand::RngExt;
+
+struct World {
+    corpus: Corpus,
+    policy: Policy,
+    dynamics: Dynamics,
+    samples: Samples,
+    model_inputs: Vec<f32>,
+    rows: Vec<usize>,
+    settings: TrainSettings,
+}
+
+fn world(task: Task, structure: Structure, settings: TrainSettings) -> World {
+    let corpus = Corpus::new(&demos(task, 8, 20, 5), "training").expect("demos");
+    let mut rng = stream(2, "world", 0);
+    let policy = Policy::new(&corpus, &settings, &mut rng);
+    let pretrain = PretrainSettings { structure, hidden_units: 16, features: settings.features, ..Default::default() };
+    let dynamics = Dynamics::new(&corpus, &pretrain, &mut rng);
+    World {
+        samples: corpus.policy_samples(&policy),
+        model_inputs: corpus.model_samples(&dynamics).inputs,
+        rows: corpus.rows_of(&[6, 1, 3, 0, 5, 2, 4, 7]),
+        corpus,
+        policy,
+        dynamics,
+        settings,
+    }
+}
+
+fn small(settings: TrainSettings) -> TrainSettings {
+    TrainSettings { hidden_units: 12, hidden_layers: 2, ..settings }
+}
+
+impl World {
+    fn bc_loss(&self, work: &mut bc::Workspace) -> f64 {
+        let batch = bc::Batch { samples: &self.samples, rows: &self.rows, demos: 8.0 };
+        behavior_cloning(&self.policy, batch, &bc::Choices::new(&self.settings), &mut stream(4, "noise", 0), work).l_bc
+    }
+
+    fn segments(&self) -> Vec<Segment> {
+        let mut segments = Vec::new();
+        let lengths = [6, 1, 3, 0, 5, 2, 4, 7].map(|d| self.corpus.demo(d).len());
+        let mut rng = stream(5, "coins", 0);
+        draw_segments(lengths.into_iter(), self.settings.rho, self.settings.sc_pairs, &mut rng, &mut segments);
+        segments
+    }
+
+    /// L_SC with its whole gradient.
+    fn sc_loss(&self, gradient: &mut Vec<f32>, d_log_std: &mut [f32; JOINTS]) -> f64 {
+        let (mut bc_work, mut work) = (bc::Workspace::default(), sc::Workspace::default());
+        self.bc_loss(&mut bc_work);
+        let noise = noise(&self.settings, self.rows.len());
+        let mean = bc_work.mean.clone();
+        let batch = sc::Batch {
+            corpus: &self.corpus,
+            model_inputs: &self.model_inputs,
+            rows: &self.rows,
+            demos: 8,
+            mean: &mean,
+            noise: &noise,
+        };
+        let choices = sc::Choices::new(&self.settings, &self.corpus);
+        let l_sc = state_cloning(&self.policy, &self.dynamics, batch, &self.segments(), &choices, &mut work);
+        gradient.resize(self.policy.net.params().len(), 0.0);
+        policy_gradient(&self.policy, (0.0, 1.0), &work.d_first, &mut bc_work, gradient);
+        add_scaled(gradient, &work.gradient, 1.0);
+        *d_log_std = work.d_log_std;
+        l_sc
+    }
+}
+
+fn noise(settings: &TrainSettings, rows: usize) -> Vec<f32> {
+    let mut noise = Vec::new();
+    bc::draw_noise(settings.action == ActionChoice::Sample, rows, &mut stream(6, "noise", 0), &mut noise);
+    noise
+}
+
+/// Derivatives along random directions of all weights, and of each log standard deviation.
+fn check(world: &mut World, gradient: &[f32], d_log_std: &[f32], mut loss: impl FnMut(&World) -> f64, what: &str) {
+    let mut rng = stream(9, "directions", 0);
+    let scale = (gradient.iter().map(|g| g * g).sum::<f32>().sqrt() / 10.0).max(1e-6);
+    let close = |numeric: f64, analytic: f64, floor: f64, what: &str| {
+        assert!((numeric - analytic).abs() < 0.02 * (numeric.abs() + floor), "{what}: {analytic} against {numeric}");
+    };
+    for k in 0..12 {
+        // every second direction lies in one part of the weights, so that no layer hides behind another
+        let n = gradient.len();
+        let part = if k % 2 == 0 { 0..n } else { n * (k / 2) / 6..n * (k / 2 + 1) / 6 };
+        let mut direction = vec![0.0f32; n];
+        direction[part].iter_mut().for_each(|d| *d = 2.0 * rng.random::<f32>() - 1.0);
+        let length = direction.iter().map(|d| d * d).sum::<f32>().sqrt();
+        direction.iter_mut().for_each(|d| *d /= length);
+        let kept = world.policy.net.params().to_vec();
+        let mut at = |h: f32| {
+            world.policy.net.params_mut().copy_from_slice(&kept);
+            add_scaled(world.policy.net.params_mut(), &direction, h);
+            loss(world)
+        };
+        let h = 4e-3;
+        let numeric = (at(h) - at(-h)) / f64::from(2.0 * h);
+        at(0.0);
+        let analytic = gradient.iter().zip(&direction).map(|(g, d)| f64::from(g * d)).sum::<f64>();
+        close(numeric, analytic, f64::from(scale), &format!("{what}, direction {k}"));
+    }
+    let std_scale = d_log_std.iter().fold(1e-6f32, |m, d| m.max(d.abs()));
+    for (i, analytic) in d_log_std.iter().enumerate() {
+        let mut at = |h: f32| {
+            world.policy.log_std[i] += h;
+            let value = loss(world);
+            world.policy.log_std[i] -= h;
+            value
+        };
+        let numeric = (at(1e-2) - at(-1e-2)) / 2e-2;
+        close(numeric, f64::from(*analytic), f64::from(std_scale), &format!("{what}, log std {i}"));
+    }
+}
+
+#[test]
+fn behavior_cloning_gradient_equals_finite_differences() {
+    for (action, loss) in [(ActionChoice::Mean, Objective::StandardisedMean), (ActionChoice::Sample, Objective::RawSum)] {
+        let settings = small(TrainSettings { action, loss, ..Default::default() });
+        let mut world = world(Task::Stack, Structure::Plain, settings);
+        let mut work = bc::Workspace::default();
+        world.bc_loss(&mut work);
+        let mut gradient = vec![0.0; world.policy.net.params().len()];
+        policy_gradient(&world.policy, (1.0, 0.0), &[], &mut work, &mut gradient);
+        // under the mean action the log standard deviations learn from the likelihood, which nn::gaussian tests
+        let d_log_std = if action == ActionChoice::Sample { work.d_log_std.to_vec() } else { vec![] };
+        check(&mut world, &gradient, &d_log_std, |w| w.bc_loss(&mut bc::Workspace::default()), &format!("{action:?}"));
+    }
+}
+
+fn sc_worlds() -> Vec<(&'static str, World)> {
+    let defaults = TrainSettings { rho: 0.3, ..Default::default() };
+    vec![
+        ("fk-near, kinematic", world(Task::Stack, Structure::Kinematic, small(defaults.clone()))),
+        (
+            "raw, plain, sampled, literal",
+            world(
+                Task::PickUp,
+                Structure::Plain,
+                small(TrainSettings {
+                    features: FeatureSet::Raw,
+                    mask_dq: false,
+                    action: ActionChoice::Sample,
+                    loss: Objective::RawSum,
+                    sc_pairs: Pairs::AfterRecovery,
+                    ..defaults.clone()
+                }),
+            ),
+        ),
+        (
+            "fk, relu, state scale, no recovery",
+            world(
+                Task::PickAndPlace,
+                Structure::Kinematic,
+                small(TrainSettings {
+                    features: FeatureSet::Fk,
+                    mask_dq: false,
+                    activation: Activation::Relu,
+                    sc_scale: StateScale::State,
+                    rho: 0.0,
+                    ..defaults
+                }),
+            ),
+        ),
+    ]
+}
+
+#[test]
+fn state_cloning_gradient_equals_finite_differences() {
+    for (name, mut world) in sc_worlds() {
+        let (mut gradient, mut d_log_std) = (Vec::new(), [0.0; JOINTS]);
+        world.sc_loss(&mut gradient, &mut d_log_std);
+        let d_log_std = if world.settings.action == ActionChoice::Sample { d_log_std.to_vec() } else { vec![] };
+        check(&mut world, &gradient, &d_log_std, |w| w.sc_loss(&mut Vec::new(), &mut [0.0; JOINTS]), name);
+    }
+}
+
+/// Algorithm 3 as printed, one demo and one step at a time, with back-propagation through time along the demo.
+fn step_by_step(world: &World, gradient: &mut [f32]) -> f64 {
+    let World { corpus, policy, dynamics, settings, .. } = world;
+    let choices = sc::Choices::new(settings, corpus);
+    let scale = choices.scale(world.rows.len(), 8);
+    let noise = noise(settings, world.rows.len());
+    let (mut coins, mut l_sc, mut at) = (stream(5, "coins", 0), 0.0f64, 0);
+    for demo in [6, 1, 3, 0, 5, 2, 4, 7] {
+        let rows = corpus.demo(demo);
+        let steps = rows.len();
+        let (mut pi, mut f) = (Pass::new(&policy.net, steps), Pass::new(&dynamics.net, steps));
+        let (mut states, mut d_predictions, mut recovered) = (vec![corpus.state(rows.start).to_vec()], Vec::new(), Vec::new());
+        for t in 0..steps {
+            let (s, width, model_width) = (states[t].clone(), policy.net.inputs(), dynamics.inputs());
+            policy.features().forward(&s, &policy.features().hand(&s), &mut pi.input[t * width..(t + 1) * width]);
+            policy.net.forward(&mut pi, t..t + 1);
+            let action: Vec<f32> = (0..JOINTS)
+                .map(|k| {
+                    let eps = noise.get((at + t) * JOINTS + k).copied().unwrap_or(0.0);
+                    policy.action_scaling().undo(k, pi.output[t * JOINTS + k] + policy.log_std[k].exp() * eps)
+                })
+                .collect();
+            dynamics.write_inputs(&s, &action, &mut f.input[t * model_width..(t + 1) * model_width]);
+            dynamics.net.forward(&mut f, t..t + 1);
+            let mut prediction = s.clone();
+            dynamics.write_next(&s, &action, row(&f.output, BASE_DIM, t), &mut prediction[..BASE_DIM]);
+            let target = row(&corpus.next, BASE_DIM, rows.start + t);
+            let coin = coins.random::<f64>() < settings.rho;
+            let counts = !(coin && settings.sc_pairs == Pairs::AfterRecovery);
+            let mut d_prediction = [0.0f32; BASE_DIM];
+            for k in (0..BASE_DIM).filter(|_| counts) {
+                let error = prediction[k] - target[k];
+                l_sc += f64::from(scale * choices.weights[k] * error * error);
+                d_prediction[k] = 2.0 * scale * choices.weights[k] * error;
+            }
+            if coin {
+                prediction[..BASE_DIM].copy_from_slice(target);
+            }
+            d_predictions.push(d_prediction);
+            recovered.push(coin);
+            states.push(prediction);
+        }
+        let mut carry = [0.0f32; BASE_DIM];
+        for t in (0..steps).rev() {
+            let mut d_next = d_predictions[t];
+            if !recovered[t] {
+                add_scaled(&mut d_next, &carry, 1.0);
+            }
+            let known = dynamics.settings().structure == Structure::Kinematic;
+            let residual = &dynamics.residual_scaling().std;
+            (0..BASE_DIM).for_each(|k| f.d_output[t * BASE_DIM + k] = d_next[k] * residual[k]);
+            dynamics.net.backward(&mut f, t..t + 1);
+            dynamics.net.backward_input(&mut f, t..t + 1);
+            let d_input = row(&f.d_input, dynamics.inputs(), t).to_vec();
+            let seen = dynamics.features().width();
+            for k in 0..JOINTS {
+                let base = if known { 0.05 * d_next[k] + d_next[JOINTS + k] } else { 0.0 };
+                let d_action = d_input[seen + k] / dynamics.action_scaling().std[k] + base;
+                pi.d_output[t * JOINTS + k] = d_action * policy.action_scaling().std[k];
+            }
+            policy.net.backward(&mut pi, t..t + 1);
+            policy.net.backward_input(&mut pi, t..t + 1);
+            carry = d_next;
+            if known {
+                carry[JOINTS..2 * JOINTS].fill(0.0);
+            }
+            let s = &states[t];
+            let (input, d_pi) = (row(&pi.input, policy.net.inputs(), t), row(&pi.d_input, policy.net.inputs(), t));
+            policy.features().backward(s, &policy.features().hand(s), input, d_pi, &mut carry);
+            let input = row(&f.input, dynamics.inputs(), t);
+            dynamics.features().backward(s, &dynamics.features().hand(s), input, &d_input, &mut carry);
+        }
+        policy.net.add_gradient(&pi, 0..steps, gradient);
+        at += steps;
+    }
+    l_sc
+}
+
+#[test]
+fn batched_segments_equal_algorithm_3_step_by_step() {
+    for (name, world) in sc_worlds() {
+        let (mut batched, mut plain) = (Vec::new(), vec![0.0; world.policy.net.params().len()]);
+        let loss = world.sc_loss(&mut batched, &mut [0.0; JOINTS]);
+        let expected = step_by_step(&world, &mut plain);
+        assert!((loss - expected).abs() < 1e-5 * expected, "{name}: {loss} against {expected}");
+        let size = plain.iter().fold(0.0f32, |m, g| m.max(g.abs()));
+        for (i, (a, b)) in batched.iter().zip(&plain).enumerate() {
+            assert!((a - b).abs() < 1e-5 * size, "{name}, parameter {i}: {a} against {b}, largest {size}");
+        }
+    }
+}

@@ -1,0 +1,152 @@
+//! Training from end to end on toy demos.
+
+use super::testing::{demo, demos};
+use super::{Dynamics, Method, Policy, Trained, pretrain_dynamics, train};
+use crate::config::{Alpha, PretrainSettings, TrainSettings};
+use crate::demo::Demo;
+use crate::error::{Error, Result};
+use crate::interrupt::Interrupt;
+use crate::state::JOINTS;
+use crate::table::Values;
+use crate::tasks::Task;
+
+fn pretrain(task: Task, epochs: u64) -> (Dynamics, super::ModelReport) {
+    let settings = PretrainSettings { hidden_units: 24, epochs, batch_rows: 64, ..Default::default() };
+    let (train, held_out) = (demos(task, 8, 30, 0), demos(task, 2, 30, 100));
+    pretrain_dynamics(&train, &held_out, &settings, 0, &mut |_| {}, &Interrupt::default()).expect("pretraining works")
+}
+
+fn quick() -> TrainSettings {
+    TrainSettings {
+        hidden_units: 24,
+        hidden_layers: 2,
+        warm_start_updates: 30,
+        bc_batch: 64,
+        epochs: 4,
+        batch: 4,
+        ..Default::default()
+    }
+}
+
+fn run(method: Method, settings: &TrainSettings, dynamics: Option<Dynamics>) -> Result<Trained> {
+    let (demos, held_out) = (demos(Task::Stack, 8, 30, 0), demos(Task::Stack, 2, 30, 100));
+    train(method, &demos, &held_out, dynamics, settings, 7, &mut |_| {}, &Interrupt::default())
+}
+
+fn bytes(policy: &Policy) -> Vec<u32> {
+    policy.to_tensors().iter().flat_map(|t| &t.data).map(|v| v.to_bits()).collect()
+}
+
+#[test]
+fn pure_cloning_is_the_loop_with_alpha_at_its_ends() {
+    let dynamics = pretrain(Task::Stack, 2).0;
+    let fixed = |alpha: f64, warm_start_updates| TrainSettings { alpha: Alpha::Fixed(alpha), warm_start_updates, ..quick() };
+    let policy = |method, settings: &TrainSettings| bytes(&run(method, settings, Some(dynamics.clone())).expect("trains").policy);
+    let bc = policy(Method::Bc, &quick());
+    assert_eq!(policy(Method::Hil, &fixed(0.0, 30)), bc);
+    assert_eq!(bytes(&run(Method::Bc, &quick(), None).expect("needs no dynamics").policy), bc);
+    assert_eq!(policy(Method::Hil, &fixed(1.0, 0)), policy(Method::Sc, &quick()));
+    assert_ne!(policy(Method::Hil, &fixed(0.5, 30)), bc);
+}
+
+#[test]
+fn one_and_two_threads_give_the_same_bytes() {
+    let on = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads start");
+        pool.install(|| {
+            let (dynamics, report) = pretrain(Task::Stack, 3);
+            let trained = run(Method::Hil, &quick(), Some(dynamics)).expect("trains");
+            let model = trained.dynamics.expect("kept").to_tensors();
+            (bytes(&trained.policy), model, format!("{report:?}{:?}", trained.metrics))
+        })
+    };
+    assert_eq!(on(1), on(2));
+}
+
+#[test]
+fn a_toy_is_learned_by_each_method() {
+    let (dynamics, report) = pretrain(Task::Stack, 150);
+    let number = |name: &str, row: usize| match &report.errors.column(name).expect("column").values {
+        Values::F64(v) => v[row],
+        other => panic!("{other:?}"),
+    };
+    for group in [0, 1] {
+        let (network, unchanged) = (number("network_1_step", group), number("unchanged_1_step", group));
+        assert!(network < 0.2 * unchanged, "group {group}: {network} against {unchanged}");
+        assert!(number("integrated_10_steps", group) < 1e-4, "the toy integrates its commands");
+    }
+    let settings = TrainSettings { warm_start_updates: 600, epochs: 60, learning_rate: 1e-3, ..quick() };
+    let unseen = demo(Task::Stack, 30, 999);
+    let (many, held_out) = (demos(Task::Stack, 40, 30, 0), demos(Task::Stack, 2, 30, 100));
+    let error = |method: Method, settings: &TrainSettings| -> f64 {
+        let go = Interrupt::default();
+        let model = Some(dynamics.clone());
+        let trained = train(method, &many, &held_out, model, settings, 7, &mut |_| {}, &go).expect("trains");
+        let policy = trained.policy;
+        let square = |t: usize| -> f64 {
+            let label = &unseen.actions()[t * JOINTS..(t + 1) * JOINTS];
+            policy.act(unseen.state(t)).iter().zip(label).map(|(a, b)| f64::from(a - b).powi(2)).sum()
+        };
+        (0..30).map(square).sum::<f64>() / (30 * JOINTS) as f64
+    };
+    let untrained = error(Method::Bc, &TrainSettings { warm_start_updates: 1, epochs: 0, ..quick() });
+    for (method, share) in [(Method::Bc, 1.1), (Method::Hil, 1.1), (Method::Sc, 1.35)] {
+        let learned = error(method, &settings);
+        eprintln!("{method:?} {learned} {untrained}");
+        assert!(learned < share * untrained, "{method:?}: {learned} against {untrained} untrained");
+    }
+}
+
+#[test]
+fn metrics_have_one_row_an_epoch() {
+    let mut logged = Vec::new();
+    let (train_demos, held_out) = (demos(Task::Stack, 8, 30, 0), demos(Task::Stack, 2, 30, 100));
+    let dynamics = pretrain(Task::Stack, 1).0;
+    let trained = train(
+        Method::Hil,
+        &train_demos,
+        &held_out,
+        Some(dynamics),
+        &quick(),
+        7,
+        &mut |m| logged.push(m.clone()),
+        &Interrupt::default(),
+    )
+    .expect("trains");
+    assert_eq!(trained.metrics.rows(), logged.len());
+    let last = logged.last().expect("epochs");
+    assert_eq!((last.stage, last.epoch, last.epochs, last.updates), ("hil", 4, 4, 8));
+    for value in [last.l_bc, last.l_sc, last.l_mix, last.d_conv, last.alpha, last.grad_bc, last.grad_sc, last.l_model] {
+        assert!(value.is_finite() && value >= 0.0);
+    }
+}
+
+#[test]
+fn what_cannot_work_is_refused_in_words() {
+    let refused = |method, settings: &TrainSettings, dynamics| run(method, settings, dynamics).expect_err("refused");
+    for (settings, key) in [
+        (TrainSettings { rho: 1.2, ..quick() }, "train.rho = 1.2"),
+        (TrainSettings { alpha: Alpha::Fixed(-0.1), ..quick() }, "train.alpha = -0.1"),
+        (TrainSettings { tau: f64::NAN, ..quick() }, "train.tau"),
+        (TrainSettings { hidden_layers: 0, ..quick() }, "train.hidden_layers"),
+    ] {
+        let error = refused(Method::Bc, &settings, None);
+        assert!(matches!(&error, Error::Usage(m) if m.contains(key)), "{error}");
+    }
+    assert!(refused(Method::Hil, &quick(), None).to_string().contains("hilt pretrain"));
+    let other = pretrain(Task::PickUp, 1).0;
+    let message = refused(Method::Hil, &quick(), Some(other)).to_string();
+    assert!(message.contains("32") && message.contains("25"), "{message}");
+
+    let none: &[Demo] = &[];
+    let go = Interrupt::default();
+    let error = train(Method::Bc, none, none, None, &quick(), 0, &mut |_| {}, &go).expect_err("no demos");
+    assert!(error.to_string().contains("no training demo"));
+    let diverging = TrainSettings { warm_start_learning_rate: 1e30, clip_norm: 0.0, ..quick() };
+    let message = refused(Method::Bc, &diverging, None).to_string();
+    assert!(message.contains("L_BC"), "{message}");
+    go.raise();
+    let (some, held_out) = (demos(Task::Stack, 2, 9, 0), demos(Task::Stack, 1, 9, 9));
+    let error = train(Method::Bc, &some, &held_out, None, &quick(), 0, &mut |_| {}, &go).expect_err("interrupted");
+    assert!(matches!(error, Error::Interrupted));
+}
