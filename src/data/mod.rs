@@ -1,1 +1,27 @@
-//! Placeholder.
+//! Files: the only place that knows MCAP, Arrow, Parquet and safetensors.
+//!
+//! Every artefact is written beside its place and renamed when whole ([`atomic`]), says where it came from ([`provenance`]) and
+//! carries a seal over its own bytes ([`seal`]), so that a damaged file is refused before any decoder reads it.
+
+pub mod atomic;
+pub mod dataset;
+//mod inspect;
+pub mod json_file;
+mod parquet_file;
+mod proto;
+pub mod provenance;
+pub mod recording;
+pub mod seal;
+pub mod table_file;
+pub mod weights;
+
+//pub use inspect::{inspect, inspect_text};
+pub use provenance::{Provenance, hash_path};
+
+use crate::error::{Error, Result};
+use std::path::Path;
+
+/// All bytes of a file.
+fn read_bytes(path: &Path) -> Result<Vec<u8>> {
+    std::fs::read(path).map_err(|e| Error::io(path, "read", e))
+}

@@ -1,0 +1,95 @@
+//! What must hold of a dataset before anything learns from it: `meta/info.json` against the task, numbers against each other.
+
+use super::features::{Feature, features};
+use super::meta::{CODEBASE_VERSION, INFO};
+use crate::data::{Provenance, json_file, provenance, read_bytes, seal};
+use crate::error::{Error, Result};
+use crate::state::CONTROL_HZ;
+use crate::tasks::Task;
+use serde::Deserialize;
+use serde_json::Value;
+use std::collections::BTreeMap;
+use std::path::Path;
+
+/// `meta/info.json`, as far as hilt reads it.
+pub(super) struct Info {
+    pub(super) task: Task,
+    pub(super) fps: u32,
+    pub(super) episodes: usize,
+    pub(super) frames: usize,
+    pub(super) provenance: Provenance,
+    /// Content hashes by path below the root.
+    pub(super) files: BTreeMap<String, String>,
+}
+
+#[derive(Deserialize)]
+struct Counts {
+    fps: u32,
+    total_episodes: usize,
+    total_frames: usize,
+}
+
+/// Reads and checks `meta/info.json`.
+pub(super) fn info(root: &Path) -> Result<Info> {
+    let path = root.join(INFO);
+    if !path.is_file() {
+        return Err(Error::input(root, no_dataset(root)));
+    }
+    let bytes = read_bytes(&path)?;
+    let invalid = |e: serde_json::Error| Error::input(&path, format!("cannot be read: {e}"));
+    let mut value: Value = serde_json::from_slice(&bytes).map_err(invalid)?;
+    let version = value.get("codebase_version").and_then(Value::as_str).unwrap_or("none");
+    if version != CODEBASE_VERSION {
+        let message = format!("has codebase_version \"{version}\", hilt reads \"{CODEBASE_VERSION}\"; run hilt convert again");
+        return Err(Error::input(&path, message));
+    }
+    let counts: Counts = serde_json::from_value(value.clone()).map_err(invalid)?;
+    let found = json_file::provenance_of(&path, value.get(provenance::KEY).cloned())?;
+    check_features(&path, found.task, value.get("features"))?;
+    if counts.fps != CONTROL_HZ {
+        return Err(Error::input(&path, format!("has {} frames per second, hilt works at {CONTROL_HZ}", counts.fps)));
+    }
+    seal::check(&path, &bytes)?;
+    let files = value.get_mut(provenance::KEY).and_then(|h| h.get_mut("files")).map(Value::take).unwrap_or_default();
+    let files: BTreeMap<String, String> = serde_json::from_value(files).map_err(invalid)?;
+    let Counts { fps, total_episodes: episodes, total_frames: frames } = counts;
+    Ok(Info { task: found.task, fps, episodes, frames, provenance: found, files })
+}
+
+fn no_dataset(root: &Path) -> String {
+    if !root.exists() {
+        return "does not exist; hilt convert makes datasets".into();
+    }
+    let inner = |name: &str| root.join(name).join(INFO).is_file();
+    if inner(super::TRAIN) || inner(super::VALIDATION) {
+        return format!("holds the two datasets {} and {}; name one of them", super::TRAIN, super::VALIDATION);
+    }
+    format!("is no dataset: {INFO} is missing")
+}
+
+/// The declared features against those of the task.
+fn check_features(path: &Path, task: Task, declared: Option<&Value>) -> Result<()> {
+    for Feature { name, kind, width, .. } in features(task) {
+        let entry = declared.and_then(|d| d.get(name));
+        let entry = entry.ok_or_else(|| Error::input(path, format!("does not declare the feature {name} that {task} has")))?;
+        let shape: Vec<usize> = entry.get("shape").and_then(|s| serde_json::from_value(s.clone()).ok()).unwrap_or_default();
+        let dtype = entry.get("dtype").and_then(Value::as_str).unwrap_or("none");
+        if shape != [width] || dtype != kind.dtype() {
+            let message = format!("declares {name} as {dtype} {shape:?}, {task} has {} [{width}]", kind.dtype());
+            return Err(Error::input(path, message));
+        }
+    }
+    Ok(())
+}
+
+/// Refuses a number that is not finite, by column and row.
+pub(super) fn finite(path: &Path, name: &str, width: usize, first_row: usize, values: &[f32]) -> Result<()> {
+    match values.iter().position(|v| !v.is_finite()) {
+        None => Ok(()),
+        Some(at) => {
+            let row = first_row + at / width;
+            let message = format!("column {name}, row {row}, entry {}: {} is not a finite number", at % width, values[at]);
+            Err(Error::input(path, message))
+        }
+    }
+}

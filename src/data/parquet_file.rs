@@ -1,0 +1,110 @@
+//! What all our Parquet files share: zstd, provenance and seal in the metadata, checked before decoding.
+
+use super::{Provenance, provenance, seal};
+use crate::error::{Error, Result};
+use arrow_array::RecordBatch;
+use arrow_schema::{Schema, SchemaRef};
+use parquet::arrow::ArrowWriter;
+use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
+use parquet::basic::{Compression, ZstdLevel};
+use parquet::errors::ParquetError;
+use parquet::file::metadata::KeyValue;
+use parquet::file::properties::WriterProperties;
+use prost::bytes::Bytes;
+use std::path::Path;
+use std::sync::Arc;
+
+/// Who wrote the file, in Parquet's own "application version x" form.
+const CREATED_BY: &str = concat!("hilt version ", env!("CARGO_PKG_VERSION"));
+/// Metadata key of the seal.
+const SEAL_KEY: &str = "hilt.seal";
+
+/// A Parquet file in memory that grows by batches.
+pub(super) struct Writer {
+    writer: ArrowWriter<Vec<u8>>,
+}
+
+impl Writer {
+    /// A file of `schema`, with `provenance` in the metadata of the Arrow schema (where pyarrow looks) and of the file.
+    pub(super) fn new(schema: &Schema, provenance: &Provenance) -> std::result::Result<Self, ParquetError> {
+        let json = provenance.to_json();
+        let mut metadata = schema.metadata().clone();
+        metadata.insert(provenance::KEY, json.clone());
+        let schema = Arc::new(schema.clone().with_metadata(metadata));
+        let entry = |key: &str, value: String| KeyValue { key: key.into(), value: Some(value) };
+        let properties = WriterProperties::builder()
+            .set_created_by(CREATED_BY.into())
+            .set_compression(Compression::ZSTD(ZstdLevel::default()))
+            .set_key_value_metadata(Some(vec![entry(provenance::KEY, json), entry(SEAL_KEY, seal::blank())]))
+            .build();
+        Ok(Writer { writer: ArrowWriter::try_new(Vec::new(), schema, Some(properties))? })
+    }
+
+    /// Adds a batch as its own row group.
+    pub(super) fn row_group(&mut self, batch: &RecordBatch) -> std::result::Result<(), ParquetError> {
+        self.writer.write(batch)?;
+        self.writer.flush()
+    }
+
+    /// Bytes so far.
+    pub(super) fn len(&self) -> usize {
+        self.writer.bytes_written()
+    }
+
+    /// The whole file, sealed.
+    pub(super) fn finish(self) -> std::result::Result<Vec<u8>, ParquetError> {
+        Ok(seal::close(self.writer.into_inner()?))
+    }
+}
+
+/// One batch as one file.
+pub(super) fn of_batch(batch: &RecordBatch, provenance: &Provenance) -> std::result::Result<Vec<u8>, ParquetError> {
+    let mut writer = Writer::new(&batch.schema(), provenance)?;
+    writer.row_group(batch)?;
+    writer.finish()
+}
+
+/// An error while encoding what hilt itself made.
+pub(super) fn cannot_encode(path: &Path, error: impl std::fmt::Display) -> Error {
+    Error::input(path, format!("cannot be encoded as Parquet: {error}"))
+}
+
+/// Whether this is a Parquet file that another program wrote (or rewrote).
+pub(super) fn is_foreign(bytes: &[u8]) -> bool {
+    bytes.starts_with(b"PAR1") && bytes.ends_with(b"PAR1") && seal::find_last(bytes, CREATED_BY.as_bytes()).is_none()
+}
+
+/// Checks the seal, then decodes.
+///
+/// # Errors
+/// [`Error::Input`] with the reason.
+pub(super) fn open(path: &Path, bytes: Vec<u8>) -> Result<(SchemaRef, Vec<RecordBatch>)> {
+    if !bytes.starts_with(b"PAR1") {
+        return Err(Error::input(path, "is not a Parquet file; expected one written by hilt"));
+    }
+    if !bytes.ends_with(b"PAR1") {
+        return Err(Error::input(path, "is a Parquet file without its end: it is cut short; run the stage that makes it again"));
+    }
+    if is_foreign(&bytes) {
+        return Err(Error::input(path, "was written by another program than hilt; run the stage that makes it again"));
+    }
+    seal::check(path, &bytes)?;
+    decode(bytes).map_err(|e| Error::input(path, format!("cannot be decoded: {e}")))
+}
+
+/// All batches of a Parquet file.
+pub(super) fn decode(bytes: Vec<u8>) -> std::result::Result<(SchemaRef, Vec<RecordBatch>), String> {
+    let builder = ParquetRecordBatchReaderBuilder::try_new(Bytes::from(bytes)).map_err(|e| e.to_string())?;
+    let schema = Arc::clone(builder.schema());
+    let reader = builder.build().map_err(|e| e.to_string())?;
+    let batches = reader.collect::<std::result::Result<Vec<_>, _>>().map_err(|e| e.to_string())?;
+    Ok((schema, batches))
+}
+
+/// The provenance in a schema's metadata.
+pub(super) fn provenance_of(path: &Path, schema: &Schema) -> Result<Provenance> {
+    match schema.metadata().get(provenance::KEY) {
+        Some(json) => Provenance::from_json(path, json),
+        None => Err(Error::input(path, "was not written by hilt: its metadata has no \"hilt\" key")),
+    }
+}

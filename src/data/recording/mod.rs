@@ -1,0 +1,166 @@
+//! Recordings: one executed episode in one MCAP file.
+//!
+//! | topic | schema | what |
+//! |---|---|---|
+//! | `/tf` | foxglove.FrameTransforms | robot links by forward kinematics, block, base block |
+//! | `/joint_states` | foxglove.JointStates | angle \[rad\] and velocity \[rad/s\] by URDF joint name |
+//! | `/scene` | foxglove.SceneUpdate | table, blocks, goal, obstacles: once, attached to their frames |
+//! | `/hilt/scene` | hilt.Scene | what stood where at the start: once |
+//! | `/hilt/step` | hilt.Step | every control step, then the final state |
+//! | `/hilt/outcome` | hilt.Outcome | success or failure class: once, at the end |
+//!
+//! The URDF is attached as `robot.urdf`; the metadata record `hilt` holds provenance and seal. Times are simulated, from 0.
+
+mod decode;
+mod encode;
+mod foxglove;
+
+pub use foxglove::{BASE_FRAME, BLOCK_FRAME, WORLD_FRAME};
+
+use super::{Provenance, atomic, proto, provenance, read_bytes, seal};
+use crate::demo::Episode;
+use crate::error::{Error, Result};
+use crate::robot::Arm;
+use crate::state::CONTROL_HZ;
+use ::foxglove::Encode;
+use ::foxglove::messages::{FrameTransforms, JointStates, SceneUpdate};
+use mcap::records::{MessageHeader, Metadata};
+use mcap::{Attachment, McapResult, WriteOptions, Writer};
+use prost::Message;
+use std::borrow::Cow;
+use std::collections::BTreeMap;
+use std::io::Cursor;
+use std::path::Path;
+
+/// Duration of a control step on the clock of the file \[ns\].
+const STEP_NS: u64 = 1_000_000_000 / CONTROL_HZ as u64;
+/// Name of the attached robot description.
+pub const URDF_NAME: &str = "robot.urdf";
+/// Key of the provenance in the metadata record.
+const PROVENANCE: &str = "provenance";
+/// Key of the seal in the metadata record.
+const SEAL: &str = "seal";
+
+const SCENE_TOPIC: &str = "/hilt/scene";
+const STEP_TOPIC: &str = "/hilt/step";
+const OUTCOME_TOPIC: &str = "/hilt/outcome";
+
+/// Name of an episode's file, e.g. `episode-00042.mcap`.
+pub fn file_name(index: u64) -> String {
+    format!("episode-{index:05}.mcap")
+}
+
+/// Whether a name is one that [`file_name`] gives.
+pub fn is_file_name(name: &str) -> bool {
+    let digits = name.strip_prefix("episode-").and_then(|n| n.strip_suffix(".mcap"));
+    digits.is_some_and(|d| d.len() >= 5 && d.bytes().all(|b| b.is_ascii_digit()))
+}
+
+/// Writes an episode. `urdf` is the robot's description; link names are those of [`crate::robot::jaco::LINK_NAMES`].
+///
+/// # Errors
+/// [`Error::Input`] when a step's conditions do not fit the task, [`Error::Io`] when the system refuses.
+pub fn write(path: &Path, episode: &Episode, urdf: &str, provenance: &Provenance) -> Result<()> {
+    let expected = episode.scene.task.condition_names().len();
+    if let Some(step) = episode.steps.iter().chain([&episode.last]).find(|s| s.conditions.len() != expected) {
+        let message = format!("a step has {} conditions, {} has {expected}", step.conditions.len(), episode.scene.task);
+        return Err(Error::input(path, message));
+    }
+    let bytes = encode(episode, urdf, provenance).map_err(|e| Error::input(path, format!("cannot be encoded as MCAP: {e}")))?;
+    atomic::write_bytes(path, &seal::close(bytes))
+}
+
+/// Reads an episode, exactly as it was written.
+///
+/// # Errors
+/// [`Error::Input`] when the file is cut short, damaged, foreign or of another schema version, [`Error::Io`] when it cannot be read
+/// at all.
+pub fn read(path: &Path) -> Result<(Episode, Provenance)> {
+    let bytes = read_bytes(path)?;
+    if !bytes.starts_with(mcap::MAGIC) {
+        return Err(Error::input(path, "is not an MCAP file; expected a recording of hilt simulate"));
+    }
+    if !bytes.ends_with(mcap::MAGIC) {
+        return Err(Error::input(path, "is an MCAP file without its end: it is cut short; run hilt simulate again"));
+    }
+    seal::check(path, &bytes)?;
+    let provenance = read_provenance(path, &bytes)?;
+    let episode = decode::episode(&bytes).map_err(|message| Error::input(path, message))?;
+    Ok((episode, provenance))
+}
+
+fn read_provenance(path: &Path, bytes: &[u8]) -> Result<Provenance> {
+    let broken = |e: mcap::McapError| Error::input(path, format!("cannot be decoded: {e}"));
+    let summary = mcap::Summary::read(bytes).map_err(broken)?.unwrap_or_default();
+    let index = summary.metadata_indexes.iter().find(|m| m.name == provenance::KEY);
+    let index = index.ok_or_else(|| Error::input(path, "was not written by hilt: it has no metadata record \"hilt\""))?;
+    let record = mcap::read::metadata(bytes, index).map_err(broken)?;
+    let json = record.metadata.get(PROVENANCE).map_or("", String::as_str);
+    Provenance::from_json(path, json)
+}
+
+fn encode(episode: &Episode, urdf: &str, provenance: &Provenance) -> McapResult<Vec<u8>> {
+    // Without the checksum of the whole data section, which would cover the seal; chunks keep theirs.
+    let options = WriteOptions::new()
+        .compression(Some(mcap::Compression::Zstd))
+        .compression_threads(0)
+        .calculate_data_section_crc(false)
+        .library(concat!("hilt ", env!("CARGO_PKG_VERSION")));
+    let mut writer = options.create(Cursor::new(Vec::new()))?;
+    write_messages(&mut writer, episode)?;
+    writer.attach(&Attachment {
+        log_time: 0,
+        create_time: 0,
+        name: URDF_NAME.into(),
+        media_type: "application/xml".into(),
+        data: Cow::Borrowed(urdf.as_bytes()),
+    })?;
+    let entries = [(PROVENANCE.to_string(), provenance.to_json()), (SEAL.to_string(), seal::blank())];
+    writer.write_metadata(&Metadata { name: provenance::KEY.into(), metadata: BTreeMap::from(entries) })?;
+    writer.finish()?;
+    Ok(writer.into_inner().into_inner())
+}
+
+fn write_messages(writer: &mut Writer<Cursor<Vec<u8>>>, episode: &Episode) -> McapResult<()> {
+    let mut frames = foxglove_channel::<FrameTransforms>(writer, "/tf")?;
+    let mut joints = foxglove_channel::<JointStates>(writer, "/joint_states")?;
+    let mut drawing = foxglove_channel::<SceneUpdate>(writer, "/scene")?;
+    let mut scene = channel(writer, SCENE_TOPIC, "hilt.Scene", "protobuf", proto::DESCRIPTORS)?;
+    let mut steps = channel(writer, STEP_TOPIC, "hilt.Step", "protobuf", proto::DESCRIPTORS)?;
+    let mut outcome = channel(writer, OUTCOME_TOPIC, "hilt.Outcome", "protobuf", proto::DESCRIPTORS)?;
+    let arm = Arm::new();
+    scene.write(writer, 0, &encode::scene(&episode.scene))?;
+    drawing.write(writer, 0, &foxglove::drawing(&episode.scene))?;
+    let end = episode.steps.len();
+    for (t, step) in episode.steps.iter().chain([&episode.last]).enumerate() {
+        let time = t as u64 * STEP_NS;
+        frames.write(writer, time, &foxglove::frames(&arm, step, time))?;
+        joints.write(writer, time, &foxglove::joints(&step.state, time))?;
+        steps.write(writer, time, &encode::step(step, episode.scene.task, t, t == end))?;
+    }
+    outcome.write(writer, end as u64 * STEP_NS, &encode::outcome(episode))
+}
+
+/// A topic and the number of its next message.
+struct Topic {
+    id: u16,
+    sequence: u32,
+}
+
+impl Topic {
+    fn write(&mut self, writer: &mut Writer<Cursor<Vec<u8>>>, time_ns: u64, message: &impl Message) -> McapResult<()> {
+        let header = MessageHeader { channel_id: self.id, sequence: self.sequence, log_time: time_ns, publish_time: time_ns };
+        self.sequence += 1;
+        writer.write_to_known_channel(&header, &message.encode_to_vec())
+    }
+}
+
+fn channel(writer: &mut Writer<Cursor<Vec<u8>>>, topic: &str, name: &str, encoding: &str, schema: &[u8]) -> McapResult<Topic> {
+    let schema = writer.add_schema(name, encoding, schema)?;
+    Ok(Topic { id: writer.add_channel(schema, topic, "protobuf", &BTreeMap::new())?, sequence: 0 })
+}
+
+fn foxglove_channel<M: Encode>(writer: &mut Writer<Cursor<Vec<u8>>>, topic: &str) -> McapResult<Topic> {
+    let schema = M::get_schema().expect("Foxglove's own messages have schemas");
+    channel(writer, topic, &schema.name, &schema.encoding, &schema.data)
+}

@@ -1,0 +1,111 @@
+//! A seal: the BLAKE3 hash of a file, kept inside that file. It is computed over all bytes with the 64 digits of the hash itself
+//! set to zero, so any changed bit is found before a decoder sees the file.
+
+use super::provenance::SCHEMA_VERSION;
+use crate::error::{Error, Result};
+use std::path::Path;
+
+/// What stands before the 64 hexadecimal digits.
+const MARK: &str = "hilt-seal-blake3:";
+/// Hexadecimal digits of a BLAKE3 hash.
+const DIGITS: usize = 64;
+/// The field that versions of hilt agree on.
+const VERSION_FIELD: &[u8] = b"schema_version";
+
+/// The text to put into a file before [`close`]: the mark and 64 zeros.
+pub fn blank() -> String {
+    MARK.to_string() + &"0".repeat(DIGITS)
+}
+
+/// Fills in the last [`blank`] of `bytes`.
+///
+/// # Panics
+/// If `bytes` hold no seal: a writer that forgot it.
+pub fn close(mut bytes: Vec<u8>) -> Vec<u8> {
+    let at = digits_at(&bytes).expect("the writer put a blank seal into the file");
+    let hash = blake3::hash(&bytes).to_hex();
+    bytes[at..at + DIGITS].copy_from_slice(hash.as_bytes());
+    bytes
+}
+
+/// Checks the seal of a file's bytes.
+///
+/// # Errors
+/// [`Error::Input`] when there is none (another program wrote the file, or its end is missing), when the file was written by a
+/// version of hilt with another schema, or when a byte differs.
+pub fn check(path: &Path, bytes: &[u8]) -> Result<()> {
+    let Some(at) = digits_at(bytes) else {
+        return Err(Error::input(
+            path,
+            "no hilt seal found: the file is cut short or another program wrote it; run the stage that makes it again",
+        ));
+    };
+    let mut hash = blake3::Hasher::new();
+    hash.update(&bytes[..at]).update("0".repeat(DIGITS).as_bytes()).update(&bytes[at + DIGITS..]);
+    if bytes[at..at + DIGITS] == *hash.finalize().to_hex().as_bytes() {
+        return Ok(());
+    }
+    match foreign_version(bytes) {
+        Some(version) => Err(wrong_version(path, version)),
+        None => Err(Error::input(
+            path,
+            "damaged: its content does not match its seal (a changed, missing or added byte); run the stage that makes it again",
+        )),
+    }
+}
+
+/// The error for a file of another schema version.
+pub(super) fn wrong_version(path: &Path, version: u64) -> Error {
+    Error::input(
+        path,
+        format!("has schema version {version}, this hilt reads version {SCHEMA_VERSION}; run the stage that makes it again"),
+    )
+}
+
+fn digits_at(bytes: &[u8]) -> Option<usize> {
+    let at = find_last(bytes, MARK.as_bytes())? + MARK.len();
+    (at + DIGITS <= bytes.len()).then_some(at)
+}
+
+/// Position of the last occurrence of `needle`.
+pub(super) fn find_last(bytes: &[u8], needle: &[u8]) -> Option<usize> {
+    let (first, last_start) = (needle.first()?, bytes.len().checked_sub(needle.len())?);
+    (0..=last_start).rev().find(|&at| bytes[at] == *first && bytes[at..at + needle.len()] == *needle)
+}
+
+/// The number behind the last readable `schema_version`, if it is not ours.
+fn foreign_version(bytes: &[u8]) -> Option<u64> {
+    let at = find_last(bytes, VERSION_FIELD)? + VERSION_FIELD.len();
+    let rest = &bytes[at..];
+    let skipped = rest.iter().take_while(|b| b"\\\": ".contains(b)).count();
+    let digits: String = rest[skipped..].iter().take_while(|b| b.is_ascii_digit()).map(|b| char::from(*b)).collect();
+    digits.parse().ok().filter(|v| *v != u64::from(SCHEMA_VERSION))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_flipped_bit_and_every_cut_is_found() {
+        let whole = close(format!("some bytes, {{\"schema_version\":1}} {} and a tail", blank()).into_bytes());
+        let path = Path::new("file");
+        check(path, &whole).expect("untouched");
+        for at in 0..whole.len() {
+            for bit in 0..8 {
+                let mut bytes = whole.clone();
+                bytes[at] ^= 1 << bit;
+                assert!(check(path, &bytes).is_err(), "byte {at} bit {bit}");
+            }
+            assert!(check(path, &whole[..at]).is_err(), "cut at {at}");
+        }
+    }
+
+    #[test]
+    fn an_edited_version_is_named() {
+        let whole = close(format!("{{\\\"schema_version\\\":1}} {}", blank()).into_bytes());
+        let edited = String::from_utf8(whole).expect("text").replace(":1}", ":7}");
+        let message = check(Path::new("f"), edited.as_bytes()).unwrap_err().to_string();
+        assert!(message.contains("schema version 7"), "{message}");
+    }
+}

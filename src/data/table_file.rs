@@ -1,0 +1,117 @@
+//! Tables (plans, metrics, evaluation logs) as Parquet; every column carries its description and unit in its own metadata.
+
+use super::{Provenance, atomic, parquet_file, read_bytes};
+use crate::error::{Error, Result};
+use crate::table::{Column, Table, Values};
+use arrow_array::cast::AsArray;
+use arrow_array::types::{Float32Type, Float64Type, Int64Type};
+use arrow_array::{
+    Array, ArrayRef, ArrowPrimitiveType, BooleanArray, Float32Array, Float64Array, Int64Array, RecordBatch, StringArray,
+};
+use arrow_schema::{ArrowError, DataType, Field, Schema};
+use std::path::Path;
+use std::sync::Arc;
+
+/// Field metadata: what the column is.
+const DOC: &str = "doc";
+/// Field metadata: its unit.
+const UNIT: &str = "unit";
+
+/// Endings of column names and their units; the longest that fits counts.
+const UNITS: [(&str, &str); 13] = [
+    ("_rad_s2", "rad/s^2"),
+    ("_rad_s", "rad/s"),
+    ("_m_s2", "m/s^2"),
+    ("_m_s", "m/s"),
+    ("_n_m", "N m"),
+    ("_rad", "rad"),
+    ("_deg", "deg"),
+    ("_kg", "kg"),
+    ("_hz", "Hz"),
+    ("_ms", "ms"),
+    ("_n", "N"),
+    ("_m", "m"),
+    ("_s", "s"),
+];
+
+/// The unit that a column's name carries (`speed_m_s` is in m/s).
+pub fn unit_of(name: &str) -> Option<&'static str> {
+    UNITS.iter().find(|(ending, _)| name.ends_with(ending)).map(|(_, unit)| *unit)
+}
+
+/// Writes a table. NaN is kept; a reader that cannot use it says so.
+///
+/// # Errors
+/// [`Error::Input`] when the columns differ in length or share a name, [`Error::Io`] when the system refuses.
+pub fn write(path: &Path, table: &Table, provenance: &Provenance) -> Result<()> {
+    for (i, column) in table.columns.iter().enumerate() {
+        if column.values.len() != table.rows() {
+            let message = format!("column {} has {} rows, the first has {}", column.name, column.values.len(), table.rows());
+            return Err(Error::input(path, message));
+        }
+        if table.columns[..i].iter().any(|c| c.name == column.name) {
+            return Err(Error::input(path, format!("two columns are named {}", column.name)));
+        }
+    }
+    let batch = to_batch(table).map_err(|e| parquet_file::cannot_encode(path, e))?;
+    let bytes = parquet_file::of_batch(&batch, provenance).map_err(|e| parquet_file::cannot_encode(path, e))?;
+    atomic::write_bytes(path, &bytes)
+}
+
+/// Reads what [`write`] wrote.
+///
+/// # Errors
+/// [`Error::Input`] when the file is missing its end, damaged, foreign or of another schema version, [`Error::Io`] when it
+/// cannot be read at all.
+pub fn read(path: &Path) -> Result<(Table, Provenance)> {
+    let (schema, batches) = parquet_file::open(path, read_bytes(path)?)?;
+    let provenance = parquet_file::provenance_of(path, &schema)?;
+    let mut table = Table::default();
+    for (i, field) in schema.fields().iter().enumerate() {
+        let values = gather(field.data_type(), batches.iter().map(|b| b.column(i)))
+            .ok_or_else(|| Error::input(path, format!("column {} has type {}", field.name(), field.data_type())))?;
+        let doc = field.metadata().get(DOC).map(|d| d.to_string()).unwrap_or_default();
+        table.columns.push(Column { name: field.name().clone(), doc, values });
+    }
+    Ok((table, provenance))
+}
+
+fn to_batch(table: &Table) -> std::result::Result<RecordBatch, ArrowError> {
+    let mut fields = Vec::with_capacity(table.columns.len());
+    let mut arrays: Vec<ArrayRef> = Vec::with_capacity(table.columns.len());
+    for column in &table.columns {
+        let array: ArrayRef = match &column.values {
+            Values::F32(v) => Arc::new(Float32Array::from(v.clone())),
+            Values::F64(v) => Arc::new(Float64Array::from(v.clone())),
+            Values::I64(v) => Arc::new(Int64Array::from(v.clone())),
+            Values::Bool(v) => Arc::new(BooleanArray::from(v.clone())),
+            Values::Text(v) => Arc::new(StringArray::from(v.clone())),
+        };
+        let mut metadata = arrow_schema::Metadata::new().with(DOC, column.doc.clone());
+        if let Some(unit) = unit_of(&column.name) {
+            metadata.insert(UNIT, unit);
+        }
+        fields.push(Field::new(&column.name, array.data_type().clone(), false).with_metadata(metadata));
+        arrays.push(array);
+    }
+    let options = arrow_array::RecordBatchOptions::new().with_row_count(Some(table.rows()));
+    RecordBatch::try_new_with_options(Arc::new(Schema::new(fields)), arrays, &options)
+}
+
+/// The values of a column's pieces; `None` for a type that tables do not have.
+fn gather<'a>(kind: &DataType, pieces: impl Iterator<Item = &'a ArrayRef>) -> Option<Values> {
+    Some(match kind {
+        DataType::Float32 => Values::F32(numbers::<Float32Type>(pieces)),
+        DataType::Float64 => Values::F64(numbers::<Float64Type>(pieces)),
+        DataType::Int64 => Values::I64(numbers::<Int64Type>(pieces)),
+        DataType::Boolean => Values::Bool(pieces.flat_map(|a| a.as_boolean().values().iter()).collect()),
+        DataType::Utf8 => {
+            Values::Text(pieces.flat_map(|a| a.as_string::<i32>().iter().map(|s| s.unwrap_or_default().to_string())).collect())
+        }
+        _ => return None,
+    })
+}
+
+fn numbers<'a, T: ArrowPrimitiveType>(pieces: impl Iterator<Item = &'a ArrayRef>) -> Vec<T::Native> {
+    pieces.flat_map(|a| a.as_primitive::<T>().values().iter().copied()).collect()
+}
