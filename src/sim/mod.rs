@@ -1,1 +1,13 @@
-//! Placeholder.
+//! Contact physics: the arm, the table, the blocks and the obstacles in one rapier world, stepped at the control rate.
+//! The only module that knows rapier.
+
+mod arm;
+mod contacts;
+mod convert;
+mod disturbance;
+mod episode;
+mod world;
+
+pub use disturbance::Disturbance;
+pub use episode::{Controller, run_episode};
+pub use world::World;

@@ -1,0 +1,85 @@
+//! What touches what, and how hard.
+
+use crate::demo::Contacts;
+use crate::robot::jaco::HAND_LINK;
+use rapier3d::prelude::{Collider, ContactPair, PhysicsWorld, Pose};
+
+/// Surfaces this near touch although no force was exchanged yet \[m\] (a world that was just set).
+const TOUCH_M: f32 = 1e-4;
+
+/// Whom a collider belongs to; kept in rapier's user data, so that a snapshot carries it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Owner {
+    Table,
+    Obstacle,
+    Block,
+    Base,
+    /// A link of the robot, by index.
+    Link(usize),
+}
+
+/// User data of link 0; the others follow.
+const FIRST_LINK_CODE: u128 = 4;
+
+impl Owner {
+    pub(super) fn code(self) -> u128 {
+        match self {
+            Owner::Table => 0,
+            Owner::Obstacle => 1,
+            Owner::Block => 2,
+            Owner::Base => 3,
+            Owner::Link(i) => FIRST_LINK_CODE + i as u128,
+        }
+    }
+
+    fn of(collider: &Collider) -> Self {
+        match collider.user_data {
+            0 => Owner::Table,
+            1 => Owner::Obstacle,
+            2 => Owner::Block,
+            3 => Owner::Base,
+            link => Owner::Link((link - FIRST_LINK_CODE) as usize),
+        }
+    }
+}
+
+/// Reads all contacts of the last physics step, which lasted `substep_s`.
+pub(super) fn read(physics: &PhysicsWorld) -> Contacts {
+    let mut contacts = Contacts::default();
+    for pair in physics.contact_pairs() {
+        let [one, other] = [pair.collider1, pair.collider2].map(|h| &physics.colliders[h]);
+        let impulse = pair.total_impulse_magnitude();
+        if impulse <= 0.0 && separation(pair, one.position(), other.position()) > TOUCH_M {
+            continue;
+        }
+        let force_n = f64::from(impulse / physics.integration_parameters.dt);
+        match ordered(Owner::of(one), Owner::of(other)) {
+            (Owner::Link(link), Owner::Block) if link > HAND_LINK => contacts.finger_block_n[link - HAND_LINK - 1] += force_n,
+            (Owner::Link(_), Owner::Obstacle) => contacts.robot_obstacle = true,
+            (Owner::Link(_), Owner::Table) => contacts.robot_table = true,
+            (Owner::Block, Owner::Table) => contacts.block_table = true,
+            (Owner::Block, Owner::Base) => contacts.block_base = true,
+            _ => {}
+        }
+    }
+    contacts
+}
+
+/// Links first, then the block, then what stands still.
+fn ordered(one: Owner, other: Owner) -> (Owner, Owner) {
+    let rank = |o: Owner| match o {
+        Owner::Link(_) => 0,
+        Owner::Block => 1,
+        _ => 2,
+    };
+    if rank(one) <= rank(other) { (one, other) } else { (other, one) }
+}
+
+/// Distance of the surfaces now \[m\]: rapier keeps the contact points of a pair that hardly moved, so its own figure may be old.
+fn separation(pair: &ContactPair, one: &Pose, other: &Pose) -> f32 {
+    let points = pair.manifolds().iter().flat_map(|m| m.points.iter().map(move |p| (m, p)));
+    points.fold(f32::INFINITY, |least, (manifold, point)| {
+        let gap = (*other * point.local_p2) - (*one * point.local_p1);
+        least.min(gap.dot(one.rotation * manifold.local_n1))
+    })
+}

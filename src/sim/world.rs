@@ -1,0 +1,168 @@
+//! One arm, a table, a block, perhaps a base block and obstacles, in rapier.
+
+use super::arm::{self, SURFACE_FRICTION};
+use super::contacts::{self, Owner};
+use super::convert::{pose, to_pose, vector};
+use crate::error::{Error, Result};
+use crate::robot::kinematics::tool_of;
+use crate::robot::{Arm, LinkPoses, READY_Q_RAD};
+use crate::scene::{BLOCK_EDGE_M, Scene};
+use crate::state::{Action, CONTROL_DT_S, Context, JOINTS, Pose, State};
+use crate::tasks::Observation;
+use rapier3d::prelude::*;
+use serde::{Deserialize, Serialize};
+
+/// Physics steps in a control step.
+const PHYSICS_STEPS: usize = 2;
+/// Gravity \[m/s^2\].
+const GRAVITY_M_S2: Real = 9.81;
+/// Substeps of a physics step, and sweeps over all constraints in each (measured: 2 and 2 lose one grasp in seven).
+const SOLVER_ITERATIONS: usize = 4;
+const SWEEPS: usize = 8;
+/// Contact spring, natural frequency \[Hz\] and damping ratio: penetration below 1 mm under a grasp (rapier's 30 Hz: 5 mm).
+const CONTACT_HZ: Real = 200.0;
+const CONTACT_DAMPING: Real = 2.0;
+/// Contacts of a pair that moved less than this are kept \[m\].
+const RECYCLE_M: Real = 0.002;
+/// Half extents of the table, a box whose top is the plane z = 0 \[m\]: beyond the arm's reach, too thick to fall through.
+const TABLE_HALF_M: [f64; 3] = [1.5, 1.5, 0.25];
+
+/// The simulated scene. Stepping it depends on nothing but its own state and the actions.
+#[derive(Serialize, Deserialize)]
+pub struct World {
+    scene: Scene,
+    physics: PhysicsWorld,
+    robot: MultibodyJointHandle,
+    block: RigidBodyHandle,
+    base: Option<RigidBodyHandle>,
+    /// Quaternion x y z w of the last observed block: the next keeps its sign.
+    block_quaternion: [f64; 4],
+    #[serde(skip)]
+    kinematics: Arm,
+}
+
+impl World {
+    /// The start of an episode: the arm at rest in its ready pose, block and base block standing where the scene has them.
+    pub fn new(scene: &Scene) -> World {
+        World::at(scene, &State { q_rad: READY_Q_RAD, dq_rad_s: [0.0; JOINTS], block: scene.block, context: scene.context })
+    }
+
+    fn at(scene: &Scene, state: &State) -> World {
+        let mut physics = PhysicsWorld::new();
+        physics.integration_parameters = IntegrationParameters { dt: 0.0, ..parameters() };
+        physics.gravity = Vector::new(0.0, 0.0, -GRAVITY_M_S2);
+        insert_fixed(&mut physics, Owner::Table, [0.0, 0.0, -TABLE_HALF_M[2]], TABLE_HALF_M);
+        for obstacle in &scene.obstacles {
+            insert_fixed(&mut physics, Owner::Obstacle, obstacle.center_m, obstacle.size_m.map(|s| s / 2.0));
+        }
+        let block = insert_cube(&mut physics, Owner::Block, &state.block, scene);
+        let base = match state.context {
+            Context::Base(base) => Some(insert_cube(&mut physics, Owner::Base, &base, scene)),
+            Context::None | Context::Goal(_) => None,
+        };
+        let robot = arm::insert(&mut physics, &state.q_rad, &state.dq_rad_s);
+        // A step of no duration finds the contacts and moves nothing.
+        physics.step();
+        physics.integration_parameters = parameters();
+        World {
+            scene: scene.clone(),
+            physics,
+            robot,
+            block,
+            base,
+            block_quaternion: state.block.quaternion_xyzw,
+            kinematics: Arm::new(),
+        }
+    }
+
+    /// One control step of 50 ms with the joint velocities `executed` \[rad/s\] (used in f32).
+    pub fn step(&mut self, executed: &Action) {
+        arm::command(&mut self.physics, self.robot, executed);
+        for _ in 0..PHYSICS_STEPS {
+            self.physics.step();
+        }
+    }
+
+    /// What there is to see now. Forces are those of the physics step that led here (0 in a world that was just made or set).
+    pub fn observe(&mut self) -> Observation {
+        let (q_rad, dq_rad_s) = arm::read(&self.physics, self.robot);
+        let body = &self.physics.bodies[self.block];
+        let mut block = to_pose(body.position());
+        let agreement: f64 = block.quaternion_xyzw.iter().zip(&self.block_quaternion).map(|(a, b)| a * b).sum();
+        if agreement < 0.0 {
+            block.quaternion_xyzw = block.quaternion_xyzw.map(|v| -v);
+        }
+        self.block_quaternion = block.quaternion_xyzw;
+        Observation {
+            state: State { q_rad, dq_rad_s, block, context: self.scene.context },
+            tool_m: tool_of(&self.kinematics.link_poses(&q_rad)).translation.vector.into(),
+            base_now: self.base.map(|handle| to_pose(self.physics.bodies[handle].position())),
+            contacts: contacts::read(&self.physics),
+            block_speed_m_s: f64::from(body.linvel().length()),
+        }
+    }
+
+    /// Poses of the arm's links, from its joint angles.
+    pub fn link_poses(&self) -> LinkPoses {
+        self.kinematics.link_poses(&arm::read(&self.physics, self.robot).0)
+    }
+
+    /// Puts the world into a recorded state: exact in joint angles, joint velocities and block pose. The block is at rest, the base
+    /// block stands where the state's context has it, and contacts start without force: in the middle of a grasp the future
+    /// differs from the recorded one by about half a millimetre.
+    pub fn set_state(&mut self, state: &State) {
+        *self = World::at(&self.scene, state);
+    }
+
+    /// Everything that the future depends on, as bytes.
+    pub fn snapshot(&self) -> Vec<u8> {
+        postcard::to_stdvec(self).expect("the world is plain data")
+    }
+
+    /// The world of a [`World::snapshot`]; it continues bit for bit.
+    ///
+    /// # Errors
+    /// [`Error::Failed`] when the bytes are no snapshot of this version.
+    pub fn restore(bytes: &[u8]) -> Result<World> {
+        postcard::from_bytes(bytes)
+            .map_err(|e| Error::Failed(format!("{} bytes are no snapshot of a world by this version of hilt: {e}", bytes.len())))
+    }
+}
+
+fn parameters() -> IntegrationParameters {
+    let softness = SpringCoefficients::new(CONTACT_HZ, CONTACT_DAMPING);
+    IntegrationParameters {
+        dt: (CONTROL_DT_S / PHYSICS_STEPS as f64) as Real,
+        num_solver_iterations: SOLVER_ITERATIONS,
+        num_internal_pgs_iterations: SWEEPS,
+        num_internal_stabilization_iterations: 1,
+        contact_softness: softness,
+        static_contact_softness: softness,
+        friction_in_bias_pass: false,
+        normalized_contact_recycle_distance: RECYCLE_M,
+        ..IntegrationParameters::default()
+    }
+}
+
+fn insert_fixed(physics: &mut PhysicsWorld, owner: Owner, center_m: [f64; 3], half_m: [f64; 3]) {
+    let half = vector(half_m);
+    let collider = ColliderBuilder::cuboid(half.x, half.y, half.z)
+        .translation(vector(center_m))
+        .friction(SURFACE_FRICTION)
+        .restitution(0.0)
+        .user_data(owner.code());
+    physics.insert(RigidBodyBuilder::fixed(), collider);
+}
+
+fn insert_cube(physics: &mut PhysicsWorld, owner: Owner, at: &Pose, scene: &Scene) -> RigidBodyHandle {
+    let half = (BLOCK_EDGE_M / 2.0) as Real;
+    // The block's friction multiplies that of whatever it touches, which is 1: it holds against everything.
+    let friction = if owner == Owner::Block { scene.friction as Real } else { SURFACE_FRICTION };
+    let collider = ColliderBuilder::cuboid(half, half, half)
+        .mass(scene.block_mass_kg as Real)
+        .friction(friction)
+        .friction_combine_rule(CoefficientCombineRule::Multiply)
+        .restitution(0.0)
+        .user_data(owner.code());
+    physics.insert(RigidBodyBuilder::dynamic().pose(pose(at)).can_sleep(false), collider).0
+}

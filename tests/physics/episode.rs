@@ -1,0 +1,140 @@
+//! The episode loop: noise on what is executed, pulses at their rate, ends and records that hold.
+
+use crate::scene;
+use crate::scripted::Script;
+use hilt::config::{PulseSettings, SimulateSettings};
+use hilt::demo::Episode;
+use hilt::robot::VELOCITY_LIMITS_RAD_S;
+use hilt::scene::Scene;
+use hilt::sim::{Controller, Disturbance, run_episode};
+use hilt::state::{ARM_JOINTS, Action, JOINTS};
+use hilt::tasks::{FailureClass, Observation, Task};
+
+/// Always asks for the same.
+struct Constant(Action);
+
+impl Controller for Constant {
+    fn command(&mut self, _seen: &Observation) -> Action {
+        self.0
+    }
+}
+
+fn disturbance(settings: &SimulateSettings, index: u64) -> Disturbance {
+    Disturbance::new(settings, hilt::seed::stream(5, "simulate", index))
+}
+
+fn run(scene: &Scene, controller: &mut dyn Controller, index: u64, max_steps: u32) -> Episode {
+    run_episode(index, scene, controller, &mut disturbance(&SimulateSettings::default(), index), max_steps)
+}
+
+/// The figure of merit of the scripted grasp under noise; the bound leaves room for the script, which is no planner.
+#[test]
+fn noisy_episodes_of_all_tasks_succeed() {
+    for task in Task::ALL {
+        let count = 20;
+        let solved = (0..count).filter(|i| {
+            let scene = scene(task, *i);
+            let mut script = match task {
+                Task::PickUp => Script::lift(&scene.block),
+                _ => Script::carry(&scene.block, scene.target_m()),
+            };
+            let episode = run(&scene, &mut script, *i, 400);
+            if !episode.success {
+                println!("{task} {i}: {:?} after {} steps", episode.failure, episode.steps.len());
+            }
+            episode.success
+        });
+        let solved = solved.count();
+        println!("{task}: {solved} of {count}");
+        assert!(solved >= 19, "{task}: {solved} of {count} scripted episodes succeed");
+    }
+}
+
+#[test]
+fn a_successful_episode_is_recorded_whole() {
+    let scene = scene(Task::PickUp, 0);
+    let episode = run(&scene, &mut Script::lift(&scene.block), 0, 400);
+    assert!(episode.success && episode.failure.is_none());
+    let total: f64 = episode.steps.iter().chain([&episode.last]).map(|s| s.reward).sum();
+    assert!((total - 1.11).abs() < 1e-12, "milestones of pick-up add up to {total}");
+    assert!(episode.last.conditions.iter().all(|c| *c));
+    assert_eq!(episode.last.executed, [0.0; JOINTS]);
+    assert_eq!(episode.to_demo().expect("finite numbers").len(), episode.steps.len());
+}
+
+#[test]
+fn noise_is_on_the_executed_action_only() {
+    let command: Action =
+        std::array::from_fn(|i| if i < ARM_JOINTS { 0.01 * i as f64 } else { 0.0 }).map(|v: f64| f64::from(v as f32));
+    let episode = run(&scene(Task::PickUp, 0), &mut Constant(command), 0, 400);
+    let mut sum = [0.0; JOINTS];
+    let mut squares = [0.0; JOINTS];
+    for step in &episode.steps {
+        assert_eq!(step.commanded, command);
+        for i in 0..JOINTS {
+            let noise = step.executed[i] - command[i];
+            sum[i] += noise;
+            squares[i] += noise * noise;
+            assert_eq!(f64::from(step.executed[i] as f32), step.executed[i], "executed actions are f32 numbers");
+        }
+    }
+    let n = episode.steps.len() as f64;
+    assert_eq!(n, 400.0);
+    for i in 0..JOINTS {
+        // Three standard errors of a mean and of a variance over 400 draws.
+        assert!((sum[i] / n).abs() < 3.5 * (0.001f64 / n).sqrt(), "joint {i}: mean {}", sum[i] / n);
+        assert!((squares[i] / n - 0.001).abs() < 3.5 * 0.001 * (2.0 / n).sqrt(), "joint {i}: variance {}", squares[i] / n);
+    }
+}
+
+#[test]
+fn executed_actions_stay_within_the_velocity_limits() {
+    let mut noise = disturbance(&SimulateSettings::default(), 1);
+    for _ in 0..100 {
+        for (v, limit) in noise.apply(&VELOCITY_LIMITS_RAD_S.map(|l| 1.5 * l)).iter().zip(VELOCITY_LIMITS_RAD_S) {
+            assert!(*v <= limit && *v > 0.9 * limit, "{v} rad/s against a limit of {limit}");
+        }
+    }
+}
+
+#[test]
+fn pulses_come_at_their_rate_last_their_time_and_move_the_arm_only() {
+    let pulses = PulseSettings { probability: 0.05, steps: 4, sigma_rad_s: 0.1 };
+    let mut noise = disturbance(&SimulateSettings { noise_variance: 0.0, pulses, ..SimulateSettings::default() }, 0);
+    let count = 20_000;
+    let actions: Vec<Action> = (0..count).map(|_| noise.apply(&[0.0; JOINTS])).collect();
+    let pushed = actions.iter().filter(|a| a[0] != 0.0).count() as f64 / f64::from(count);
+    // A pulse of 4 steps after 0.95 / 0.05 quiet steps on average.
+    let expected = 4.0 / (4.0 + 0.95 / 0.05);
+    assert!((pushed - expected).abs() < 0.02, "{pushed} of the steps are pushed, expected {expected}");
+    assert!(actions.iter().all(|a| a[ARM_JOINTS..].iter().all(|v| *v == 0.0)), "a pulse moved a finger");
+    let changes = actions.windows(2).filter(|w| w[0] != w[1] && w[1][0] != 0.0).count() as f64;
+    assert!((changes * 4.0 / f64::from(count) - pushed).abs() < 0.01, "pulses last four steps");
+    let quiet = disturbance(&SimulateSettings { noise_variance: 0.0, ..SimulateSettings::default() }, 0).apply(&[0.0; JOINTS]);
+    assert_eq!(quiet, [0.0; JOINTS]);
+}
+
+#[test]
+fn an_idle_arm_never_reaches_and_a_fallen_block_ends_the_episode() {
+    let mut scene = scene(Task::PickUp, 0);
+    let idle = run(&scene, &mut Constant([0.0; JOINTS]), 0, 50);
+    assert_eq!((idle.steps.len(), idle.success, idle.failure), (50, false, Some(FailureClass::NeverReached)));
+    scene.block.position_m = [3.0, 0.0, 0.5];
+    let fallen = run(&scene, &mut Constant([0.0; JOINTS]), 0, 200);
+    assert!(fallen.steps.len() < 20, "a block that falls past the table ends the episode, not {} steps", fallen.steps.len());
+}
+
+#[test]
+fn a_command_that_is_no_number_ends_the_episode_unrecorded() {
+    struct Breaks(u32);
+    impl Controller for Breaks {
+        fn command(&mut self, _seen: &Observation) -> Action {
+            self.0 += 1;
+            if self.0 > 5 { [f64::NAN; JOINTS] } else { [0.0; JOINTS] }
+        }
+    }
+    let episode = run(&scene(Task::PickUp, 0), &mut Breaks(0), 0, 50);
+    assert_eq!(episode.steps.len(), 5);
+    assert!(!episode.success);
+    episode.to_demo().expect("only finite numbers are recorded");
+}

@@ -1,0 +1,118 @@
+//! Runs repeat, snapshots continue, recorded states can be set.
+
+use crate::scripted::Script;
+use crate::{distance, play, scene};
+use hilt::config::SimulateSettings;
+use hilt::sim::{Controller, Disturbance, World, run_episode};
+use hilt::state::State;
+use hilt::tasks::Task;
+
+/// Control steps until the scripted block is in the air.
+const MID_CARRY: usize = 105;
+
+/// The world in the middle of a carry, and its script.
+fn mid_carry(task: Task, index: u64) -> (World, Script) {
+    let scene = scene(task, index);
+    let mut world = World::new(&scene);
+    let mut script = Script::carry(&scene.block, scene.target_m());
+    for _ in 0..MID_CARRY {
+        let seen = world.observe();
+        world.step(&script.command(&seen));
+    }
+    assert!(world.observe().gripped(), "the block is in the hand");
+    (world, script)
+}
+
+/// The next `steps` states as bits, of what the script does.
+fn future(world: &mut World, script: &mut Script, steps: usize) -> Vec<u32> {
+    let mut bits = Vec::new();
+    for _ in 0..steps {
+        let seen = world.observe();
+        bits.extend(seen.state.to_row().iter().map(|v| v.to_bits()));
+        bits.extend(seen.contacts.finger_block_n.map(|f| (f as f32).to_bits()));
+        world.step(&script.command(&seen));
+    }
+    bits
+}
+
+#[test]
+fn an_episode_repeats_bit_for_bit_on_any_thread() {
+    let run = || {
+        let scene = scene(Task::Stack, 3);
+        let mut script = Script::carry(&scene.block, scene.target_m());
+        let mut noise = Disturbance::new(&SimulateSettings::default(), hilt::seed::stream(0, "simulate", 3));
+        run_episode(3, &scene, &mut script, &mut noise, 300)
+    };
+    let here = run();
+    let there = std::thread::spawn(run).join().expect("the thread ran");
+    assert!(here.steps.len() > 100);
+    assert_eq!(here, there);
+}
+
+#[test]
+fn recorded_actions_reproduce_the_recorded_states() {
+    let scene = scene(Task::PickUp, 4);
+    let mut script = Script::lift(&scene.block);
+    let mut noise = Disturbance::new(&SimulateSettings::default(), hilt::seed::stream(0, "simulate", 4));
+    let episode = run_episode(4, &scene, &mut script, &mut noise, 200);
+    let demo = episode.to_demo().expect("a sound episode");
+    let mut world = World::new(&scene);
+    for t in 0..demo.len() {
+        assert_eq!(world.observe().state.to_row(), demo.state(t), "state {t}");
+        let executed: Vec<f64> = demo.executed()[t * 9..(t + 1) * 9].iter().map(|v| f64::from(*v)).collect();
+        world.step(&executed.try_into().expect("nine joints"));
+    }
+    assert_eq!(world.observe().state.to_row(), demo.state(demo.len()));
+}
+
+#[test]
+fn a_snapshot_continues_bit_for_bit() {
+    for index in 0..3 {
+        let (mut world, mut script) = mid_carry(Task::Stack, index);
+        let bytes = world.snapshot();
+        println!("snapshot {} bytes", bytes.len());
+        let mut restored = World::restore(&bytes).expect("a snapshot");
+        let mut twin = script.clone();
+        let (one, other) = (future(&mut world, &mut script, 150), future(&mut restored, &mut twin, 150));
+        assert!(one == other, "world {index} continues differently after a snapshot");
+    }
+}
+
+#[test]
+fn bytes_that_are_no_snapshot_are_refused() {
+    let bytes = World::new(&scene(Task::PickUp, 0)).snapshot();
+    let message = World::restore(&bytes[..bytes.len() / 2]).map(|_| ()).unwrap_err().to_string();
+    assert!(message.contains("no snapshot"), "{message}");
+}
+
+#[test]
+fn a_recorded_state_can_be_set_exactly() {
+    for (task, index) in [(Task::PickUp, 0), (Task::PickAndPlace, 1), (Task::Stack, 2)] {
+        let (mut world, mut script) = if task == Task::PickUp {
+            let scene = scene(task, index);
+            let mut world = World::new(&scene);
+            let mut script = Script::lift(&scene.block);
+            play(&mut world, &mut script, 1);
+            (world, script)
+        } else {
+            mid_carry(task, index)
+        };
+        let row = world.observe().state.to_row();
+        let recorded = State::from_row(task, &row).expect("a row of this task");
+        let mut set = World::new(&scene(task, index));
+        set.set_state(&recorded);
+        let seen = set.observe().state;
+        let error = seen.to_row().iter().zip(&row).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
+        assert!(error < 1e-6, "{task}: set with an error of {error}");
+        let mut twin = script.clone();
+        for _ in 0..20 {
+            let (a, b) = (world.observe(), set.observe());
+            world.step(&script.command(&a));
+            set.step(&twin.command(&b));
+        }
+        let apart = distance(&world.observe().state.block, &set.observe().state.block);
+        println!("{task} apart {apart}");
+        assert!(apart < 3e-3, "{task}: block {apart} m away from the recorded future after 1 s");
+        assert!(set.observe().gripped(), "{task}: dropped after setting the state");
+    }
+}
