@@ -1,7 +1,9 @@
-//! The arm: constants of the Kinova Jaco j2n6s300, forward kinematics, Jacobian, differential inverse kinematics.
+//! The arm: constants of the Kinova Jaco j2n6s300, forward kinematics, Jacobian, differential inverse kinematics, URDF.
 
 pub mod jaco;
 pub mod kinematics;
+pub mod urdf;
 
 pub use jaco::{LINK_SHAPES, LinkShape, POSITION_LIMITS_RAD, READY_Q_RAD, Shape, VELOCITY_LIMITS_RAD_S};
 pub use kinematics::{Arm, LinkPoses};
+pub use urdf::urdf;

@@ -1,0 +1,141 @@
+//! Closed triangle meshes of the primitives, tessellated once in their own frame.
+
+use crate::robot::Shape;
+use nalgebra::{Isometry3, Rotation3, Vector3};
+use std::f64::consts::{FRAC_PI_2, TAU};
+
+/// Corners around a capsule: round enough that its outline shows no edges at README size.
+const AROUND: usize = 20;
+/// Rings of a capsule's half sphere.
+const RINGS: usize = 5;
+
+/// A point of a surface with its outward normal.
+#[derive(Clone, Copy, Debug)]
+pub struct Vertex {
+    /// \[m\].
+    pub at: Vector3<f32>,
+    /// Unit length.
+    pub normal: Vector3<f32>,
+}
+
+/// Triangles, counter-clockwise seen from outside.
+#[derive(Clone, Debug, Default)]
+pub struct Mesh {
+    /// Corner points.
+    pub vertices: Vec<Vertex>,
+    /// Indices into `vertices`.
+    pub triangles: Vec<[u32; 3]>,
+}
+
+impl Mesh {
+    /// The surface of a collision primitive.
+    pub fn of_shape(shape: &Shape) -> Self {
+        match *shape {
+            Shape::Box { center_m, half_m } => Mesh::cuboid(center_m, half_m),
+            Shape::Capsule { from_m, to_m, radius_m } => Mesh::capsule(from_m.into(), to_m.into(), radius_m),
+        }
+    }
+
+    /// A box along the axes: centre and half edges \[m\].
+    pub fn cuboid(center_m: [f64; 3], half_m: [f64; 3]) -> Self {
+        let mut mesh = Mesh::default();
+        for axis in 0..3 {
+            for side in [-1.0, 1.0] {
+                let normal = Vector3::ith(axis, side);
+                // u x v points outwards, so that the corners below run counter-clockwise.
+                let u = Vector3::ith((axis + 1) % 3, side);
+                let v = Vector3::ith((axis + 2) % 3, 1.0);
+                let corner =
+                    |a: f64, b: f64| Vector3::from(center_m) + (normal + u * a + v * b).component_mul(&Vector3::from(half_m));
+                let corners = [corner(-1.0, -1.0), corner(1.0, -1.0), corner(1.0, 1.0), corner(-1.0, 1.0)];
+                let first = mesh.vertices.len() as u32;
+                mesh.vertices.extend(corners.map(|at| Vertex { at: at.cast(), normal: normal.cast() }));
+                mesh.triangles.extend([[first, first + 1, first + 2], [first, first + 2, first + 3]]);
+            }
+        }
+        mesh
+    }
+
+    /// A segment with a radius \[m\]: rings of corners from the pole behind `from` to the pole beyond `to`.
+    pub fn capsule(from: Vector3<f64>, to: Vector3<f64>, radius: f64) -> Self {
+        let axis = to - from;
+        // Any turn that brings z onto the axis will do; a half turn about x is the one for an axis along -z.
+        let turn = Rotation3::rotation_between(&Vector3::z(), &axis)
+            .unwrap_or_else(|| Rotation3::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI));
+        let mut mesh = Mesh::default();
+        let rows = 2 * (RINGS + 1);
+        for row in 0..rows {
+            let far = row > RINGS;
+            let step = if far { row - RINGS - 1 } else { row };
+            let elevation = FRAC_PI_2 * (step as f64 / RINGS as f64 - if far { 0.0 } else { 1.0 });
+            let (up, out) = elevation.sin_cos();
+            for k in 0..AROUND {
+                let (sin, cos) = (TAU * k as f64 / AROUND as f64).sin_cos();
+                let normal = turn * Vector3::new(out * cos, out * sin, up);
+                let at = if far { to } else { from } + normal * radius;
+                mesh.vertices.push(Vertex { at: at.cast(), normal: normal.cast() });
+            }
+        }
+        for row in 0..rows - 1 {
+            for k in 0..AROUND {
+                let index = |row: usize, k: usize| (row * AROUND + k % AROUND) as u32;
+                let (a, b, c, d) = (index(row, k), index(row, k + 1), index(row + 1, k + 1), index(row + 1, k));
+                mesh.triangles.extend([[a, b, c], [a, c, d]]);
+            }
+        }
+        mesh
+    }
+
+    /// The twelve edges of a box as one mesh of thin bars: centre, half edges and half thickness \[m\].
+    pub fn frame(center_m: [f64; 3], half_m: [f64; 3], half_bar_m: f64) -> Self {
+        let mut mesh = Mesh::default();
+        for axis in 0..3 {
+            let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
+            for (a, b) in [(-1.0, -1.0), (-1.0, 1.0), (1.0, -1.0), (1.0, 1.0)] {
+                let (mut center, mut half) = (center_m, [half_bar_m; 3]);
+                center[u] += a * half_m[u];
+                center[v] += b * half_m[v];
+                half[axis] = half_m[axis] + half_bar_m;
+                mesh.append(&Mesh::cuboid(center, half));
+            }
+        }
+        mesh
+    }
+
+    /// Adds the triangles of another mesh.
+    pub fn append(&mut self, other: &Mesh) {
+        let first = self.vertices.len() as u32;
+        self.vertices.extend_from_slice(&other.vertices);
+        self.triangles.extend(other.triangles.iter().map(|t| t.map(|i| i + first)));
+    }
+
+    /// The vertices moved by `world_from_mesh`.
+    pub fn placed(&self, world_from_mesh: &Isometry3<f64>) -> impl Iterator<Item = Vertex> {
+        let iso: Isometry3<f32> = world_from_mesh.cast();
+        self.vertices
+            .iter()
+            .map(move |v| Vertex { at: iso.rotation * v.at + iso.translation.vector, normal: iso.rotation * v.normal })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Volume by the divergence theorem: positive only if every triangle runs counter-clockwise seen from outside.
+    fn volume(mesh: &Mesh) -> f32 {
+        let at = |i: u32| mesh.vertices[i as usize].at;
+        mesh.triangles.iter().map(|t| at(t[0]).dot(&at(t[1]).cross(&at(t[2]))) / 6.0).sum()
+    }
+
+    #[test]
+    fn meshes_are_closed_and_face_outwards() {
+        let box_volume = volume(&Mesh::cuboid([0.3, -0.2, 0.1], [0.1, 0.2, 0.3]));
+        assert!((box_volume - 0.048).abs() < 1e-5, "{box_volume}");
+        let exact = std::f32::consts::PI * 0.01 * (0.4 + 4.0 / 3.0 * 0.1);
+        for to in [[0.0, 0.0, 0.4], [0.0, 0.0, -0.4], [0.4, 0.0, 0.0]] {
+            let share = volume(&Mesh::capsule(Vector3::zeros(), to.into(), 0.1)) / exact;
+            assert!((0.95..1.0).contains(&share), "{to:?}: {share} of the exact volume");
+        }
+    }
+}

@@ -1,0 +1,259 @@
+//! Pictures of episodes by a small software rasteriser: the same bytes on every run, no GPU, no window.
+
+mod camera;
+mod colors;
+mod font;
+mod gif;
+mod mesh;
+mod raster;
+mod shadow;
+mod sheet;
+
+pub use self::gif::{GifOptions, write_gif};
+pub use sheet::write_png_sheet;
+
+use crate::demo::{Episode, Step};
+use crate::error::{Error, Result};
+use crate::robot::{Arm, LINK_SHAPES};
+use crate::scene::{BLOCK_EDGE_M, Scene};
+use crate::state::{Context, JOINTS, Pose};
+use camera::Camera;
+use mesh::Mesh;
+use nalgebra::{Isometry3, Translation3};
+use raster::{Area, Paint, Rgb, Samples};
+
+/// Samples along each edge of a pixel: 2 x 2 of them make its colour.
+const SUPERSAMPLING: usize = 2;
+/// The table's edges: x low and high, y low and high \[m\]. Wide enough for every default spawn area and the arm's foot.
+const TABLE_M: [[f64; 2]; 2] = [[-0.14, 0.72], [-0.30, 0.40]];
+/// Thickness of the table \[m\].
+const TABLE_THICKNESS_M: f64 = 0.03;
+/// The table's upper layer, which takes shadows \[m\].
+const TOP_LAYER_M: f64 = 0.001;
+/// Half thickness of the bars around the target \[m\].
+const MARKER_HALF_BAR_M: f64 = 0.0012;
+/// Room between a block that stands exactly on the target and the marker's faces \[m\].
+const MARKER_ROOM_M: f64 = 0.003;
+/// Opacity of the marker's faces.
+const MARKER_OPACITY: f32 = 0.18;
+/// Tag of the samples that take shadows.
+const TAG_TABLE: u8 = 1;
+/// Smallest and largest picture edge that writers accept \[pixels\].
+const EDGE_PX: [u32; 2] = [16, 4096];
+
+/// A picture, three bytes (red, green, blue) a pixel, row by row from the top.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct RgbImage {
+    /// Pixels in a row.
+    pub width: u32,
+    /// Rows.
+    pub height: u32,
+    /// `width * height * 3` bytes.
+    pub data: Vec<u8>,
+}
+
+/// The picture of s_t for `step` = t (0-based; T and beyond give the last state), `size` = width and height \[pixels\].
+pub fn frame(episode: &Episode, step: usize, size: (u32, u32)) -> RgbImage {
+    Renderer::new(&episode.scene, size).draw(step_at(episode, step))
+}
+
+fn step_at(episode: &Episode, step: usize) -> &Step {
+    episode.steps.get(step).unwrap_or(&episode.last)
+}
+
+fn check_size(what: &str, (width, height): (u32, u32)) -> Result<()> {
+    let allowed = EDGE_PX[0]..=EDGE_PX[1];
+    if allowed.contains(&width) && allowed.contains(&height) {
+        return Ok(());
+    }
+    let [low, high] = EDGE_PX;
+    Err(Error::Usage(format!(
+        "{what} of {width} x {height} pixels: each edge must be {low} to {high} pixels; choose another size"
+    )))
+}
+
+/// Time, then the demonstrator's phase or, at the end, how it went.
+fn label(episode: &Episode, step: usize) -> (String, Rgb) {
+    let time_s = step.min(episode.steps.len()) as f64 * crate::state::CONTROL_DT_S;
+    let (note, color) = match (step < episode.steps.len(), episode.success, episode.failure) {
+        (true, _, _) => (episode.steps[step].phase.map_or("", |p| p.name()), colors::TEXT),
+        (false, true, _) => ("success", colors::GOOD),
+        (false, false, failure) => (failure.map_or("failed", |f| f.name()), colors::BAD),
+    };
+    (format!("t {time_s:.2} s  {note}").trim_end().to_string(), color)
+}
+
+/// What is drawn in each picture of one episode, prepared once.
+struct Renderer {
+    size: (u32, u32),
+    samples: Camera,
+    pixels: Camera,
+    /// The table, before anything stands on it: samples and pixels.
+    empty: (Samples, RgbImage),
+    /// What is being drawn; shows the empty table between two pictures.
+    canvas: Samples,
+    arm: Arm,
+    robot: Vec<(usize, Mesh, Rgb)>,
+    block: Mesh,
+    obstacles: Vec<Mesh>,
+    marker_bars: Mesh,
+    marker_faces: Mesh,
+}
+
+impl Renderer {
+    fn new(scene: &Scene, size: (u32, u32)) -> Self {
+        let (width, height) = (size.0 as usize, size.1 as usize);
+        let samples = Camera::new(width * SUPERSAMPLING, height * SUPERSAMPLING);
+        let canvas = table(&samples, width * SUPERSAMPLING, height * SUPERSAMPLING);
+        let mut plain = RgbImage { width: size.0, height: size.1, data: vec![0; width * height * 3] };
+        resolve(&canvas, Area::all(width, height), &mut plain);
+        let half = BLOCK_EDGE_M / 2.0;
+        let (target, around) = (scene.target_m(), [half + MARKER_ROOM_M; 3]);
+        Renderer {
+            size,
+            pixels: Camera::new(width, height),
+            empty: (canvas.clone(), plain),
+            canvas,
+            samples,
+            arm: Arm::new(),
+            robot: LINK_SHAPES.iter().map(|s| (s.link, Mesh::of_shape(&s.shape), colors::LINK_COLORS[s.link])).collect(),
+            block: Mesh::cuboid([0.0; 3], [half; 3]),
+            obstacles: scene.obstacles.iter().map(|o| Mesh::cuboid(o.center_m, o.size_m.map(|v| v / 2.0))).collect(),
+            marker_bars: Mesh::frame(target, around, MARKER_HALF_BAR_M),
+            marker_faces: Mesh::cuboid(target, around),
+        }
+    }
+
+    fn draw(&mut self, step: &Step) -> RgbImage {
+        let base = step.base_now.or(match step.state.context {
+            Context::Base(base) => Some(base),
+            Context::None | Context::Goal(_) => None,
+        });
+        let mut canvas = std::mem::replace(&mut self.canvas, Samples::new(0, 0, colors::BACKGROUND));
+        let solids = self.solids(&step.state.q_rad, &step.state.block, base.as_ref());
+        let mask = shadow::Mask::new(&self.pixels, self.size.0 as usize, self.size.1 as usize, &solids);
+        mask.darken(&mut canvas, SUPERSAMPLING, TAG_TABLE);
+        for (mesh, pose, rgb) in &solids {
+            canvas.draw(&self.samples, mesh, pose, Paint { rgb: *rgb, opacity: 1.0, tag: 0 });
+        }
+        let marker = |opacity| Paint { rgb: colors::TARGET, opacity, tag: 0 };
+        canvas.draw(&self.samples, &self.marker_bars, &Isometry3::identity(), marker(1.0));
+        canvas.draw(&self.samples, &self.marker_faces, &Isometry3::identity(), marker(MARKER_OPACITY));
+        let mut picture = self.empty.1.clone();
+        resolve(&canvas, canvas.drawn.coarse(SUPERSAMPLING), &mut picture);
+        canvas.restore(&self.empty.0);
+        self.canvas = canvas;
+        picture
+    }
+
+    /// Everything that casts a shadow: mesh, where it is, colour.
+    fn solids(&self, q_rad: &[f64; JOINTS], block: &Pose, base: Option<&Pose>) -> Vec<(&Mesh, Isometry3<f64>, Rgb)> {
+        let poses = self.arm.link_poses(q_rad);
+        let mut solids: Vec<_> = self.robot.iter().map(|(link, mesh, rgb)| (mesh, poses[*link], *rgb)).collect();
+        solids.push((&self.block, block.isometry(), colors::BLOCK));
+        solids.extend(base.map(|b| (&self.block, b.isometry(), colors::BASE)));
+        solids.extend(self.obstacles.iter().map(|mesh| (mesh, Isometry3::identity(), colors::OBSTACLE)));
+        solids
+    }
+}
+
+/// Sets the pixels of `area` to the mean of their samples.
+fn resolve(samples: &Samples, area: Area, picture: &mut RgbImage) {
+    const COUNT: u16 = (SUPERSAMPLING * SUPERSAMPLING) as u16;
+    for y in area.rows[0]..area.rows[1] {
+        let rows: [&[[u8; 4]]; SUPERSAMPLING] =
+            std::array::from_fn(|i| &samples.color[(y * SUPERSAMPLING + i) * samples.width..][..samples.width]);
+        for x in area.columns[0]..area.columns[1] {
+            let mut sum = [COUNT / 2; 3];
+            for cell in rows.iter().flat_map(|r| &r[x * SUPERSAMPLING..(x + 1) * SUPERSAMPLING]) {
+                (0..3).for_each(|i| sum[i] += u16::from(cell[i]));
+            }
+            let at = (y * picture.width as usize + x) * 3;
+            picture.data[at..at + 3].copy_from_slice(&sum.map(|v| (v / COUNT) as u8));
+        }
+    }
+}
+
+/// Background and table.
+fn table(camera: &Camera, width: usize, height: usize) -> Samples {
+    let mut samples = Samples::new(width, height, colors::BACKGROUND);
+    let middle = |[low, high]: [f64; 2]| (low + high) / 2.0;
+    let half = |[low, high]: [f64; 2]| (high - low) / 2.0;
+    let mut layer = |top_m: f64, bottom_m: f64, tag: u8| {
+        let center = [middle(TABLE_M[0]), middle(TABLE_M[1]), (top_m + bottom_m) / 2.0];
+        let mesh = Mesh::cuboid(center, [half(TABLE_M[0]), half(TABLE_M[1]), (top_m - bottom_m) / 2.0]);
+        samples.draw(camera, &mesh, &Translation3::identity().into(), Paint { rgb: colors::TABLE, opacity: 1.0, tag });
+    };
+    layer(0.0, -TOP_LAYER_M, TAG_TABLE);
+    layer(-TOP_LAYER_M, -TABLE_THICKNESS_M, 0);
+    samples.drawn = Area::NONE;
+    samples
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::demo::Contacts;
+    use crate::robot::READY_Q_RAD;
+    use crate::state::State;
+    use crate::tasks::Task;
+    use nalgebra::Vector3;
+
+    fn still(block: Pose, base: Pose) -> (Scene, Step) {
+        let context = Context::Base(base);
+        let scene = Scene { task: Task::Stack, block, context, obstacles: Vec::new(), friction: 1.0, block_mass_kg: 0.1 };
+        let step = Step {
+            state: State { q_rad: READY_Q_RAD, dq_rad_s: [0.0; JOINTS], block, context },
+            base_now: None,
+            commanded: [0.0; JOINTS],
+            executed: [0.0; JOINTS],
+            contacts: Contacts::default(),
+            block_speed_m_s: 0.0,
+            reward: 0.0,
+            conditions: Vec::new(),
+            phase: None,
+        };
+        (scene, step)
+    }
+
+    #[test]
+    fn blocks_show_their_colour_where_their_centres_project() {
+        let base = Pose::from_yaw([0.45, 0.27, 0.025], 0.0);
+        for (x, y) in [(0.40, -0.10), (0.50, 0.0), (0.60, 0.12)] {
+            let (scene, mut step) = still(Pose::from_yaw([x, y, 0.025], 0.4), base);
+            step.base_now = Some(Pose::from_yaw([0.36, 0.30, 0.025], 0.2));
+            let picture = Renderer::new(&scene, (480, 360)).draw(&step);
+            for (pose, rgb) in [(step.state.block, colors::BLOCK), (step.base_now.unwrap(), colors::BASE)] {
+                let at = Vector3::from(pose.position_m).cast();
+                let [column, row, _] = Camera::new(480, 360).project(&at).expect("before the camera");
+                let start = (row as usize * 480 + column as usize) * 3;
+                let seen = Vector3::from_fn(|i, _| f32::from(picture.data[start + i]));
+                let turn = seen.angle(&Vector3::from(rgb.map(f32::from)));
+                assert!(turn < 0.05, "{seen} instead of a shade of {rgb:?} at {pose:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_picture_does_not_depend_on_the_one_before() {
+        let (scene, step) = still(Pose::from_yaw([0.5, 0.0, 0.025], 0.0), Pose::from_yaw([0.45, 0.27, 0.025], 0.0));
+        let mut other = step.clone();
+        other.state.q_rad = READY_Q_RAD.map(|v| v + 0.3);
+        let mut renderer = Renderer::new(&scene, (160, 120));
+        let first = renderer.draw(&step);
+        assert_ne!(renderer.draw(&other), first);
+        assert_eq!(renderer.draw(&step), first);
+    }
+
+    #[test]
+    fn numbers_that_are_no_place_draw_nothing() {
+        let (scene, mut step) = still(Pose::from_yaw([0.5, 0.0, 0.025], 0.0), Pose::from_yaw([0.45, 0.27, 0.025], 0.0));
+        for wrong in [f64::NAN, f64::INFINITY, 1e30, -1e30] {
+            step.state.block.position_m = [wrong; 3];
+            step.state.q_rad = [wrong; JOINTS];
+            let (width, height) = (64, 48);
+            assert_eq!(Renderer::new(&scene, (width, height)).draw(&step).data.len(), (width * height * 3) as usize);
+        }
+        assert!(Renderer::new(&scene, (0, 0)).draw(&step).data.is_empty());
+    }
+}
