@@ -82,19 +82,18 @@ pub struct Progress<'a> {
 impl Progress<'_> {
     /// One more item is done.
     pub fn step(&self) {
-        let done = self.done.fetch_add(1, Ordering::Relaxed) + 1;
-        match &self.bar {
-            Some(bar) => bar.inc(1),
-            None if done < self.total && done * PLAIN_LINES / self.total != (done - 1) * PLAIN_LINES / self.total => {
-                self.console.say(&format!("{}: {done}/{} {}", self.stage, self.total, self.unit));
-            }
-            None => {}
-        }
+        self.step_with("");
     }
 
-    /// A line for people while the count goes on.
-    pub fn say(&self, line: &str) {
-        self.console.say(&format!("{}: {line}", self.stage));
+    /// One more item is done; `more` words say how it stands.
+    pub fn step_with(&self, more: &str) {
+        let done = self.done.fetch_add(1, Ordering::Relaxed) + 1;
+        if let Some(bar) = &self.bar {
+            bar.set_message(format!("{}{more}", self.unit));
+            bar.inc(1);
+        } else if done < self.total && done * PLAIN_LINES / self.total != (done - 1) * PLAIN_LINES / self.total {
+            self.console.say(&format!("{}: {done}/{} {}{more}", self.stage, self.total, self.unit));
+        }
     }
 
     /// The stage is over: its wall time and rate, and `more` words.

@@ -4,6 +4,7 @@ mod common;
 mod console;
 mod convert;
 mod dropped;
+mod epochs;
 mod evaluate;
 mod inspect;
 mod output;

@@ -1,6 +1,8 @@
 //! Results on stdout.
 
 use crate::error::{Error, Result};
+use crate::report::table::text_table;
+use crate::table::{Table, Values};
 use serde::Serialize;
 use std::io::{ErrorKind, Write, stdout};
 use std::path::Path;
@@ -24,4 +26,19 @@ pub fn print(text: &str) -> Result<()> {
 pub fn print_json(value: &impl Serialize) -> Result<()> {
     let text = serde_json::to_string_pretty(value).map_err(|e| Error::Failed(format!("cannot write JSON: {e}")))?;
     print(&format!("{text}\n"))
+}
+
+/// A table as text, numbers with four significant digits.
+pub fn table_text(table: &Table) -> String {
+    let header: Vec<&str> = table.columns.iter().map(|c| c.name.as_str()).collect();
+    let cell = |values: &Values, row: usize| match values {
+        Values::F32(v) => format!("{:.3e}", v[row]),
+        Values::F64(v) => format!("{:.3e}", v[row]),
+        Values::I64(v) => v[row].to_string(),
+        Values::Bool(v) => v[row].to_string(),
+        Values::Text(v) => v[row].clone(),
+    };
+    let rows: Vec<Vec<String>> =
+        (0..table.rows()).map(|row| table.columns.iter().map(|c| cell(&c.values, row)).collect()).collect();
+    text_table(&header, &rows)
 }

@@ -1,10 +1,11 @@
 use super::common::{SettingsArgs, path_or};
-use super::{Context, Outcome};
+use super::epochs::Epochs;
+use super::{Context, Outcome, output};
 use crate::config::Stage;
 use crate::data::{dataset, table_file, weights};
 use crate::demo::Demo;
 use crate::error::Result;
-use crate::learn;
+use crate::learn::{EpochMetrics, pretrain_dynamics};
 use crate::tasks::Task;
 use std::path::{Path, PathBuf};
 
@@ -19,7 +20,7 @@ pub struct Args {
     /// Directory with the datasets train and validation [default: runs/<TASK>/dataset]
     #[arg(long, value_name = "DIR")]
     dataset: Option<PathBuf>,
-    /// Weights to write; the report goes beside them, as .parquet [default: runs/<TASK>/dynamics.safetensors]
+    /// Weights to write, with their errors (same name, .parquet) and pretraining.parquet, the epochs, beside them [default: runs/<TASK>/dynamics.safetensors]
     #[arg(long, value_name = "FILE.safetensors")]
     out: Option<PathBuf>,
 }
@@ -31,14 +32,14 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome> {
     let (train, validation) = demos(&dir, pipeline.task)?;
     let provenance = args.settings.provenance(Stage::Pretrain, &pipeline, &[&dir])?;
 
-    let progress = context.console.progress("pretrain", pipeline.pretrain.epochs, "epochs");
+    let mut epochs = Epochs::new(&context.console);
     let seed = args.settings.seed;
-    let log = |line: &str| progress.say(line);
-    let (dynamics, report) =
-        learn::pretrain_dynamics(&train, &validation, &pipeline.pretrain, seed, &mut &log, &context.interrupt)?;
-    progress.finish("");
-    context.console.say(&report.to_text());
-    table_file::write(&out.with_extension("parquet"), &report.to_table(), &provenance)?;
+    let mut log = |epoch: &EpochMetrics| epochs.step(epoch);
+    let (dynamics, report) = pretrain_dynamics(&train, &validation, &pipeline.pretrain, seed, &mut log, &context.interrupt)?;
+    epochs.finish();
+    context.console.say(output::table_text(&report.errors).trim_end());
+    table_file::write(&out.with_extension("parquet"), &report.errors, &provenance)?;
+    table_file::write(&out.with_file_name("pretraining.parquet"), &report.metrics, &provenance)?;
     weights::write(&out, KIND, &dynamics.to_tensors(), &dynamics.meta(), &provenance)?;
     context.console.say(&format!("pretrain: wrote {}", out.display()));
     Ok(Outcome::Done)

@@ -1,11 +1,12 @@
 use super::common::{SettingsArgs, path_or, same_task};
-use super::pretrain::{self, demos};
-use super::{Context, Outcome};
+use super::epochs::Epochs;
+use super::{Context, Outcome, pretrain};
 use crate::config::Stage;
 use crate::data::{table_file, weights};
 use crate::error::{Error, Result};
-use crate::learn::{self, Dynamics, EpochMetrics, Method};
-use std::path::PathBuf;
+use crate::learn::{Dynamics, EpochMetrics, Method, train};
+use crate::tasks::Task;
+use std::path::{Path, PathBuf};
 
 /// Kind of the weights that this stage writes.
 pub const KIND: &str = "policy";
@@ -16,7 +17,7 @@ pub struct Args {
     #[command(flatten)]
     settings: SettingsArgs,
     /// Method: hil, bc or sc
-    #[arg(long, value_name = "METHOD", default_value = "hil")]
+    #[arg(long, value_name = "METHOD", default_value = "hil", value_parser = method)]
     method: Method,
     /// State recovery probability, 0 to 1 [default: train.rho]
     #[arg(long, value_name = "RHO")]
@@ -27,7 +28,7 @@ pub struct Args {
     /// Directory with the datasets train and validation [default: runs/<TASK>/dataset]
     #[arg(long, value_name = "DIR")]
     dataset: Option<PathBuf>,
-    /// Weights of the dynamics network [default: runs/<TASK>/dynamics.safetensors]
+    /// Weights of the dynamics network; bc needs none [default: runs/<TASK>/dynamics.safetensors]
     #[arg(long, value_name = "FILE.safetensors")]
     dynamics: Option<PathBuf>,
     /// Weights to write [default: runs/<TASK>/policy.safetensors]
@@ -45,19 +46,34 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome> {
     let model = path_or(args.dynamics.as_deref(), pipeline.task, "dynamics.safetensors");
     let out = path_or(args.out.as_deref(), pipeline.task, "policy.safetensors");
     let metrics = args.metrics.clone().unwrap_or_else(|| out.with_file_name("training.parquet"));
-    let (train, validation) = demos(&dir, pipeline.task)?;
-    let (tensors, meta, made) = weights::read(&model, pretrain::KIND)?;
-    same_task(&model, made.task, pipeline.task)?;
-    let dynamics = Dynamics::from_tensors(&tensors, &meta).map_err(|why| Error::input(&model, why))?;
-    let provenance = args.settings.provenance(Stage::Train, &pipeline, &[&dir, &model])?;
+    let (demos, validation) = pretrain::demos(&dir, pipeline.task)?;
+    let needs_model = args.method != Method::Bc || args.dynamics.is_some();
+    let dynamics = needs_model.then(|| read_dynamics(&model, pipeline.task)).transpose()?;
+    let inputs: &[&Path] = if needs_model { &[&dir, &model] } else { &[&dir] };
+    let provenance = args.settings.provenance(Stage::Train, &pipeline, inputs)?;
 
-    let progress = context.console.progress("train", pipeline.train.epochs, "epochs");
+    let mut epochs = Epochs::new(&context.console);
     let seed = args.settings.seed;
-    let log = |line: &str| progress.say(line);
-    let trained = learn::train(args.method, &train, &validation, dynamics, &pipeline.train, seed, &mut &log, &context.interrupt)?;
-    progress.finish("");
-    table_file::write(&metrics, &EpochMetrics::to_table(&trained.metrics), &provenance)?;
+    let mut log = |epoch: &EpochMetrics| epochs.step(epoch);
+    let trained = train(args.method, &demos, &validation, dynamics, &pipeline.train, seed, &mut log, &context.interrupt)?;
+    epochs.finish();
+    table_file::write(&metrics, &trained.metrics, &provenance)?;
     weights::write(&out, KIND, &trained.policy.to_tensors(), &trained.policy.meta(), &provenance)?;
     context.console.say(&format!("train: wrote {}", out.display()));
     Ok(Outcome::Done)
+}
+
+fn read_dynamics(path: &Path, task: Task) -> Result<Dynamics> {
+    let (tensors, meta, made) = weights::read(path, pretrain::KIND)?;
+    same_task(path, made.task, task)?;
+    Dynamics::from_tensors(&tensors, &meta).map_err(|why| Error::input(path, why))
+}
+
+fn method(name: &str) -> std::result::Result<Method, String> {
+    match name {
+        "hil" => Ok(Method::Hil),
+        "bc" => Ok(Method::Bc),
+        "sc" => Ok(Method::Sc),
+        _ => Err(format!("unknown method \"{name}\"; allowed: hil (both losses), bc (behavior cloning), sc (state cloning)")),
+    }
 }

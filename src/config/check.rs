@@ -23,6 +23,9 @@ pub(super) fn resolve(table: Table, origin: &str) -> Result<Pipeline> {
             range.check(&key, &value).map_err(|why| Error::Usage(format!("{origin}: {why}")))?;
         }
     }
+    for learning in [pipeline.pretrain.validate(), pipeline.train.validate()] {
+        learning.map_err(|why| Error::Usage(format!("{origin}: {why}")))?;
+    }
     ordered("scene.spawn_x_m", pipeline.scene.spawn_x_m, origin)?;
     ordered("scene.spawn_y_m", pipeline.scene.spawn_y_m, origin)?;
     Ok(pipeline)

@@ -2,12 +2,14 @@
 //! Precedence: defaults < pipeline file < `--set stage.key=value` < flags.
 
 mod check;
+mod choices;
 mod data;
 mod learn;
 mod load;
 mod ranges;
 mod scene;
 
+pub use choices::{ActionChoice, Alpha, Convergence, FeatureSet, ModelLoss, Objective, Pairs, StateScale, Structure};
 pub use data::{ConvertSettings, EvaluateSettings};
 pub use learn::{PretrainSettings, TrainSettings};
 pub use load::{Preset, Source};

@@ -231,7 +231,10 @@ mod tests {
             let h = 2e-3f32;
             let check = |analytic: f32, plus: f64, minus: f64, what: &str| {
                 let numeric = (plus - minus) / f64::from(2.0 * h);
-                assert!((numeric - f64::from(analytic)).abs() < 2e-2 * (1.0 + numeric.abs()), "{what}: {analytic} against {numeric}");
+                assert!(
+                    (numeric - f64::from(analytic)).abs() < 2e-2 * (1.0 + numeric.abs()),
+                    "{what}: {analytic} against {numeric}"
+                );
             };
             for (i, analytic) in gradient.iter().enumerate() {
                 let mut at = |sign: f32| {
