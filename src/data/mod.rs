@@ -5,7 +5,7 @@
 
 pub mod atomic;
 pub mod dataset;
-//mod inspect;
+mod inspect;
 pub mod json_file;
 mod parquet_file;
 mod proto;
@@ -15,7 +15,7 @@ pub mod seal;
 pub mod table_file;
 pub mod weights;
 
-//pub use inspect::{inspect, inspect_text};
+pub use inspect::{inspect, inspect_text};
 pub use provenance::{Provenance, hash_path};
 
 use crate::error::{Error, Result};

@@ -1,0 +1,97 @@
+//! Made-up episodes, tables and weights with awkward numbers: what files must keep exactly.
+
+use hilt::data::Provenance;
+use hilt::demo::{Contacts, Episode, Phase, Step};
+use hilt::scene::{Obstacle, Scene};
+use hilt::seed::stream;
+use hilt::state::{Context, JOINTS, Pose, State};
+use hilt::table::{Table, Values};
+use hilt::tasks::{FailureClass, Task};
+use hilt::tensor::NamedTensor;
+use rand::RngExt;
+use rand_chacha::ChaCha8Rng;
+use serde_json::json;
+
+/// A provenance with nested settings.
+pub fn provenance(stage: &str, task: Task) -> Provenance {
+    let mut made = Provenance::new(stage, task, json!({ "noise_variance": 0.001, "pulses": { "steps": 4 } }), 7);
+    made.inputs.insert("plans.parquet".into(), "ab".repeat(32));
+    made
+}
+
+/// An episode of `steps` steps, the same for the same arguments.
+pub fn episode(task: Task, index: u64, steps: usize) -> Episode {
+    let mut rng = stream(index, "files test", steps as u64);
+    let base = pose(&mut rng);
+    let context = match task {
+        Task::PickUp => Context::None,
+        Task::PickAndPlace => Context::Goal([0.5, -0.1, 0.025]),
+        Task::Stack => Context::Base(base),
+    };
+    let scene = Scene {
+        task,
+        block: pose(&mut rng),
+        context,
+        obstacles: vec![Obstacle { center_m: [0.4, 0.1, 0.1], size_m: [0.02, 0.3, 0.2] }; index as usize % 2],
+        friction: 1.0,
+        block_mass_kg: 0.1,
+    };
+    let steps: Vec<Step> = (0..steps).map(|t| step(task, context, t, &mut rng)).collect();
+    let mut last = step(task, context, 0, &mut rng);
+    last.commanded = [0.0; JOINTS];
+    last.executed = [0.0; JOINTS];
+    last.phase = None;
+    let success = index % 3 != 2;
+    Episode { index, scene, steps, last, success, failure: (!success).then_some(FailureClass::Dropped) }
+}
+
+fn step(task: Task, context: Context, t: usize, rng: &mut ChaCha8Rng) -> Step {
+    let mut commanded = numbers(rng);
+    commanded[3] = -0.0;
+    let finger_block_n = [rng.random(), 0.0, f64::MIN_POSITIVE];
+    Step {
+        state: State { q_rad: numbers(rng), dq_rad_s: numbers(rng), block: pose(rng), context },
+        base_now: (task == Task::Stack).then(|| pose(rng)),
+        commanded,
+        executed: numbers(rng),
+        contacts: Contacts { finger_block_n, block_table: rng.random(), robot_table: rng.random(), ..Contacts::default() },
+        block_speed_m_s: rng.random(),
+        reward: if t == 3 { 0.1 } else { 0.0 },
+        conditions: task.condition_names().iter().map(|_| rng.random()).collect(),
+        phase: Some(Phase::ALL[t % Phase::ALL.len()]),
+    }
+}
+
+fn numbers(rng: &mut ChaCha8Rng) -> [f64; JOINTS] {
+    std::array::from_fn(|_| rng.random_range(-3.0..3.0))
+}
+
+fn pose(rng: &mut ChaCha8Rng) -> Pose {
+    Pose::from_yaw([rng.random_range(0.3..0.6), rng.random_range(-0.2..0.2), 0.025], rng.random_range(-3.0..3.0))
+}
+
+/// A table with a column of each type, a NaN and awkward text.
+pub fn table(rows: usize) -> Table {
+    let mut rng = stream(1, "files test table", rows as u64);
+    let mut doubles: Vec<f64> = (0..rows).map(|_| rng.random_range(-1e9..1e9)).collect();
+    if let Some(first) = doubles.first_mut() {
+        *first = f64::NAN;
+    }
+    Table::default()
+        .with("loss", "mean over the epoch", Values::F32((0..rows).map(|_| rng.random()).collect()))
+        .with("speed_m_s", "speed of the block", Values::F64(doubles))
+        .with("episode", "number of the episode", Values::I64((0..rows as i64).collect()))
+        .with("solved", "whether it was solved", Values::Bool((0..rows).map(|_| rng.random()).collect()))
+        .with("failure", "why not", Values::Text((0..rows).map(|i| format!("\"é\n{}", i % 3)).collect()))
+}
+
+/// Tensors in an order that is not alphabetical.
+pub fn tensors() -> Vec<NamedTensor> {
+    let mut rng = stream(2, "files test tensors", 0);
+    let mut make = |name: &str, shape: &[usize]| NamedTensor {
+        name: name.into(),
+        shape: shape.to_vec(),
+        data: (0..shape.iter().product()).map(|_| rng.random_range(-1.0..1.0)).collect(),
+    };
+    vec![make("policy.layer_2.weight", &[9, 32]), make("policy.layer_1.weight", &[32, 25]), make("policy.layer_1.bias", &[32])]
+}
