@@ -70,9 +70,9 @@ fn planner(args: &Args, pipeline: &Pipeline, context: &Context) -> Result<Vec<Tr
         0 => pipeline.simulate.max_steps,
         given => given,
     };
-    let fresh = Planner::new(&pipeline.plan);
     rollouts(args, pipeline, horizon_steps, context, |index, scene| {
-        let plan = fresh.clone().plan(index, scene, &mut seed::stream(args.settings.seed, "evaluate.search", index));
+        let plan =
+            Planner::new(&pipeline.plan).plan(index, scene, &mut seed::stream(args.settings.seed, "evaluate.search", index));
         Ok(plan.ok().and_then(|plan| Follower::new(&plan)).map(|follower| Box::new(follower) as Box<dyn Controller>))
     })
 }

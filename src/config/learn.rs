@@ -1,13 +1,238 @@
-//! Settings of learning.
+//! Settings of learning. Defaults are the preset `best`; the literal preset of the paper sets the keys that differ.
 
+use super::choices::{ActionChoice, Alpha, Convergence, FeatureSet, ModelLoss, Objective, Pairs, StateScale, Structure};
+use crate::error::{Error, Result};
+use crate::nn::Activation;
 use serde::{Deserialize, Serialize};
 
 /// `[pretrain]`: the dynamics network, Algorithm 4.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
-pub struct PretrainSettings {}
+pub struct PretrainSettings {
+    /// Activation of the hidden layers (paper: tanh in Figure 3, rectifier in 4.2).
+    pub activation: Activation,
+    /// Hidden layers (paper: 3).
+    pub hidden_layers: usize,
+    /// Units of a hidden layer (paper: 100).
+    pub hidden_units: usize,
+    /// What the network sees of the state; the action always comes with it.
+    pub features: FeatureSet,
+    /// What is known before learning: nothing, or that joints integrate their command.
+    pub structure: Structure,
+    /// The loss of Eq. 6.
+    pub loss: ModelLoss,
+    /// Epochs E over the demos.
+    pub epochs: u64,
+    /// Transitions per update, shuffled across demos; 0 = one whole demo per update, as Algorithm 4 has it.
+    pub batch_rows: usize,
+    /// Adam's learning rate at the first update (paper: 1e-3).
+    pub learning_rate: f64,
+    /// Learning rate at the last update, reached along half a cosine; the same value keeps it constant.
+    pub final_learning_rate: f64,
+    /// Largest norm of the gradient; 0 = no limit.
+    pub clip_norm: f64,
+    /// Decay of the average of the weights that is kept as the result; 0 = the last weights.
+    pub ema_decay: f64,
+}
+
+impl Default for PretrainSettings {
+    fn default() -> Self {
+        PretrainSettings {
+            activation: Activation::Tanh,
+            hidden_layers: 3,
+            hidden_units: 100,
+            features: FeatureSet::Fk,
+            structure: Structure::Kinematic,
+            loss: ModelLoss::StandardisedHuber,
+            epochs: 200,
+            batch_rows: 512,
+            learning_rate: 1e-3,
+            final_learning_rate: 1e-5,
+            clip_norm: 1.0,
+            ema_decay: 0.999,
+        }
+    }
+}
+
+impl PretrainSettings {
+    /// Checks every key.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] names the key, its value and what is allowed.
+    pub fn validate(&self) -> Result<()> {
+        network("pretrain", self.hidden_layers, self.hidden_units)?;
+        at_least_one("pretrain.epochs", self.epochs)?;
+        optimiser("pretrain", self.clip_norm, self.ema_decay)?;
+        positive("pretrain.learning_rate", self.learning_rate)?;
+        positive("pretrain.final_learning_rate", self.final_learning_rate)
+    }
+}
 
 /// `[train]`: the policy, Algorithms 1-3.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
-pub struct TrainSettings {}
+pub struct TrainSettings {
+    /// Activation of the hidden layers (paper: tanh in Figure 3, rectifier in 4.2).
+    pub activation: Activation,
+    /// Hidden layers (paper: 3).
+    pub hidden_layers: usize,
+    /// Units of a hidden layer (paper: 100).
+    pub hidden_units: usize,
+    /// What the policy sees of the state.
+    pub features: FeatureSet,
+    /// Whether joint velocities are hidden from the policy (they invite copying the last action).
+    pub mask_dq: bool,
+    /// Units and normalisation of L_BC and L_SC.
+    pub loss: Objective,
+    /// Which a_t the losses see: the mean, or a reparameterised sample.
+    pub action: ActionChoice,
+    /// Standard deviation of the Gaussian at the start, in units of the demo actions' own.
+    pub initial_std: f64,
+    /// Smallest standard deviation, in the same units.
+    pub std_floor: f64,
+    /// What d_conv (Eq. 4) measures.
+    pub d_conv: Convergence,
+    /// tau: error of the mean action, in standard deviations of the demo actions, at which p_t falls to exp(-1/2).
+    pub tau: f64,
+    /// alpha of Eq. 1: `"adaptive"` (= d_conv) or a number in \[0, 1\].
+    pub alpha: Alpha,
+    /// Upper bound of an adaptive alpha; 1 = none.
+    pub alpha_max: f64,
+    /// Whether an adaptive alpha is averaged over about an epoch instead of following each update.
+    pub alpha_average: bool,
+    /// rho: state recovery probability of Algorithm 3.
+    pub rho: f64,
+    /// Scale of each state entry in L_SC; without effect under `loss = "raw-sum"`.
+    pub sc_scale: StateScale,
+    /// Which pairs enter the buffer B of Algorithm 3.
+    pub sc_pairs: Pairs,
+    /// Whether the dynamics network keeps learning from observed transitions (Eq. 6) during training.
+    pub fine_tune_dynamics: bool,
+    /// Learning rate of that.
+    pub dynamics_learning_rate: f64,
+    /// Updates of plain behavior cloning before Algorithm 1 begins; 0 = from scratch. State cloning alone (`sc`) leaves them out.
+    pub warm_start_updates: u64,
+    /// State-action pairs per update of the warm start, shuffled across demos.
+    pub bc_batch: usize,
+    /// Learning rate at the beginning of the warm start; it ends at `final_learning_rate`.
+    pub warm_start_learning_rate: f64,
+    /// Epochs E of Algorithm 1; 0 = only the warm start.
+    pub epochs: u64,
+    /// Demos per update of Algorithm 1 (paper: 1).
+    pub batch: usize,
+    /// Adam's learning rate at the first update of Algorithm 1 (paper: 1e-3).
+    pub learning_rate: f64,
+    /// Learning rate at the last update, reached along half a cosine; the same value keeps it constant.
+    pub final_learning_rate: f64,
+    /// Largest norm of the policy's gradient; 0 = no limit.
+    pub clip_norm: f64,
+    /// Decay of the average of the weights that is validated and kept; 0 = the last weights.
+    pub ema_decay: f64,
+}
+
+impl Default for TrainSettings {
+    fn default() -> Self {
+        TrainSettings {
+            activation: Activation::Tanh,
+            hidden_layers: 3,
+            hidden_units: 100,
+            features: FeatureSet::FkNear,
+            mask_dq: true,
+            loss: Objective::StandardisedMean,
+            action: ActionChoice::Mean,
+            initial_std: 0.5,
+            std_floor: 0.02,
+            d_conv: Convergence::Agreement,
+            tau: 0.5,
+            alpha: Alpha::Adaptive,
+            alpha_max: 1.0,
+            alpha_average: true,
+            rho: 0.6,
+            sc_scale: StateScale::Step,
+            sc_pairs: Pairs::BeforeRecovery,
+            fine_tune_dynamics: true,
+            dynamics_learning_rate: 1e-4,
+            warm_start_updates: 15_000,
+            bc_batch: 512,
+            warm_start_learning_rate: 1e-3,
+            epochs: 60,
+            batch: 8,
+            learning_rate: 3e-4,
+            final_learning_rate: 1e-5,
+            clip_norm: 1.0,
+            ema_decay: 0.999,
+        }
+    }
+}
+
+impl TrainSettings {
+    /// Checks every key.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] names the key, its value and what is allowed.
+    pub fn validate(&self) -> Result<()> {
+        network("train", self.hidden_layers, self.hidden_units)?;
+        if let Alpha::Fixed(alpha) = self.alpha {
+            unit("train.alpha", alpha)?;
+        }
+        unit("train.rho", self.rho)?;
+        unit("train.alpha_max", self.alpha_max)?;
+        for (key, value) in [
+            ("train.tau", self.tau),
+            ("train.initial_std", self.initial_std),
+            ("train.std_floor", self.std_floor),
+            ("train.dynamics_learning_rate", self.dynamics_learning_rate),
+            ("train.warm_start_learning_rate", self.warm_start_learning_rate),
+            ("train.learning_rate", self.learning_rate),
+            ("train.final_learning_rate", self.final_learning_rate),
+        ] {
+            positive(key, value)?;
+        }
+        at_least_one("train.batch", self.batch as u64)?;
+        at_least_one("train.bc_batch", self.bc_batch as u64)?;
+        if self.epochs == 0 && self.warm_start_updates == 0 {
+            return Err(Error::Usage("train.epochs and train.warm_start_updates are both 0: there is nothing to do".into()));
+        }
+        optimiser("train", self.clip_norm, self.ema_decay)
+    }
+}
+
+fn refuse(key: &str, value: impl std::fmt::Display, allowed: &str) -> Result<()> {
+    Err(Error::Usage(format!("{key} = {value} is not allowed; it must be {allowed}")))
+}
+
+fn unit(key: &str, value: f64) -> Result<()> {
+    if (0.0..=1.0).contains(&value) { Ok(()) } else { refuse(key, value, "between 0 and 1") }
+}
+
+fn positive(key: &str, value: f64) -> Result<()> {
+    if value > 0.0 && value.is_finite() { Ok(()) } else { refuse(key, value, "above 0 and finite") }
+}
+
+fn at_least_one(key: &str, value: u64) -> Result<()> {
+    if value >= 1 { Ok(()) } else { refuse(key, value, "at least 1") }
+}
+
+/// Beyond these a network is a typing error.
+const MAX_LAYERS: usize = 16;
+const MAX_UNITS: usize = 4096;
+
+fn network(stage: &str, layers: usize, units: usize) -> Result<()> {
+    if !(1..=MAX_LAYERS).contains(&layers) {
+        return refuse(&format!("{stage}.hidden_layers"), layers, &format!("from 1 to {MAX_LAYERS}"));
+    }
+    if !(1..=MAX_UNITS).contains(&units) {
+        return refuse(&format!("{stage}.hidden_units"), units, &format!("from 1 to {MAX_UNITS}"));
+    }
+    Ok(())
+}
+
+fn optimiser(stage: &str, clip_norm: f64, ema_decay: f64) -> Result<()> {
+    if !(clip_norm >= 0.0 && clip_norm.is_finite()) {
+        return refuse(&format!("{stage}.clip_norm"), clip_norm, "0 (no limit) or above");
+    }
+    if !(0.0..1.0).contains(&ema_decay) {
+        return refuse(&format!("{stage}.ema_decay"), ema_decay, "at least 0 and below 1");
+    }
+    Ok(())
+}

@@ -1,1 +1,29 @@
-//! Placeholder.
+//! The paper's method: hybrid imitation learning and its parts, one file an algorithm.
+
+pub mod behavior_cloning;
+mod corpus;
+mod dynamics;
+mod features;
+mod hand;
+pub mod hil;
+mod learner;
+mod metrics;
+mod model_report;
+mod policy;
+pub mod pretrain_dynamics;
+mod regression;
+mod rollout;
+mod scaling;
+mod shards;
+pub mod state_cloning;
+#[cfg(test)]
+mod testing;
+mod weights;
+
+pub use dynamics::Dynamics;
+pub use features::Features;
+pub use hil::{Method, Trained, train};
+pub use metrics::EpochMetrics;
+pub use model_report::ModelReport;
+pub use policy::Policy;
+pub use pretrain_dynamics::pretrain_dynamics;

@@ -1,9 +1,11 @@
 //! The arm: constants of the Kinova Jaco j2n6s300, forward kinematics, Jacobian, differential inverse kinematics, URDF.
 
+pub mod ik;
 pub mod jaco;
 pub mod kinematics;
 pub mod urdf;
 
+pub use ik::{Ik, Unreachable};
 pub use jaco::{LINK_SHAPES, LinkShape, POSITION_LIMITS_RAD, READY_Q_RAD, Shape, VELOCITY_LIMITS_RAD_S};
 pub use kinematics::{Arm, LinkPoses};
 pub use urdf::urdf;

@@ -6,8 +6,10 @@ mod contacts;
 mod convert;
 mod disturbance;
 mod episode;
+mod follower;
 mod world;
 
 pub use disturbance::Disturbance;
 pub use episode::{Controller, run_episode};
+pub use follower::Follower;
 pub use world::World;

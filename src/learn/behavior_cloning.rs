@@ -1,0 +1,199 @@
+//! Algorithm 2: behavior cloning. L_BC (Eq. 3) and the degree of policy convergence d_conv (Eq. 4) over the states of the demos.
+
+use super::corpus::{Samples, row};
+use super::policy::Policy;
+use super::shards;
+use crate::config::{ActionChoice, Convergence, Objective, TrainSettings};
+use crate::nn::{Pass, gaussian};
+use crate::state::JOINTS;
+use rand::Rng;
+use rand_distr::{Distribution, StandardNormal};
+use rayon::prelude::*;
+
+/// What Algorithm 2 returns.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Cloned {
+    /// L_BC, Eq. 3.
+    pub l_bc: f64,
+    /// d_conv, Eq. 4.
+    pub d_conv: f64,
+}
+
+/// The state-action pairs of one update.
+#[derive(Clone, Copy)]
+pub struct Batch<'a> {
+    /// The corpus' policy samples.
+    pub samples: &'a Samples,
+    /// Transitions of the corpus.
+    pub rows: &'a [usize],
+    /// Number of demos that they amount to.
+    pub demos: f64,
+}
+
+/// The keys that shape L_BC and d_conv.
+#[derive(Clone, Copy, Debug)]
+pub struct Choices {
+    action: ActionChoice,
+    objective: Objective,
+    convergence: Convergence,
+    tau: f32,
+}
+
+impl Choices {
+    /// From the settings.
+    pub fn new(settings: &TrainSettings) -> Self {
+        Choices { action: settings.action, objective: settings.loss, convergence: settings.d_conv, tau: settings.tau as f32 }
+    }
+}
+
+/// The workspace: one pass a shard.
+#[derive(Default)]
+pub struct Workspace {
+    shards: Vec<Shard>,
+    active: usize,
+    noise: Vec<f32>,
+    /// Mean actions of the batch, standardised, rows x 9.
+    pub mean: Vec<f32>,
+    /// Gradient of L_BC with respect to the log standard deviations.
+    pub d_log_std: [f32; JOINTS],
+}
+
+#[derive(Default)]
+struct Shard {
+    pass: Pass,
+    d_bc: Vec<f32>,
+    gradient: Vec<f32>,
+    loss: f64,
+    agreement: f64,
+    residual2: [f32; JOINTS],
+    d_log_std: [f32; JOINTS],
+}
+
+/// Algorithm 2 over a batch. `rng` draws the samples a_t ~ pi_theta(s_t^E) where the settings ask for them; p_t always comes from the
+/// mean unless it is the sampled density. The gradient with respect to the mean actions stays in `work` for [`policy_gradient`].
+pub fn behavior_cloning(policy: &Policy, batch: Batch, choices: &Choices, rng: &mut impl Rng, work: &mut Workspace) -> Cloned {
+    let rows = batch.rows.len();
+    let samples = choices.action == ActionChoice::Sample || choices.convergence == Convergence::SampledDensity;
+    draw_noise(samples, rows, rng, &mut work.noise);
+    work.active = shards::count(rows);
+    work.shards.resize_with(work.active.max(work.shards.len()), Shard::default);
+    let noise = &work.noise;
+    work.shards[..work.active].par_iter_mut().enumerate().for_each(|(i, shard)| {
+        let part = shards::range(rows, shards::count(rows), i);
+        shard.pass.reserve(&policy.net, part.len());
+        for (slot, r) in part.clone().enumerate() {
+            let width = policy.net.inputs();
+            shard.pass.input[slot * width..(slot + 1) * width].copy_from_slice(row(&batch.samples.inputs, width, batch.rows[r]));
+        }
+        policy.net.forward(&mut shard.pass, 0..part.len());
+        let eps = if samples { &noise[part.start * JOINTS..part.end * JOINTS] } else { &[] };
+        shard.losses(policy, batch, &batch.rows[part], eps, choices);
+    });
+    work.collect(policy, rows, choices.action)
+}
+
+/// Draws rows x 9 standard normal numbers, or none.
+pub fn draw_noise(wanted: bool, rows: usize, rng: &mut impl Rng, noise: &mut Vec<f32>) {
+    noise.clear();
+    if wanted {
+        noise.extend((0..rows * JOINTS).map(|_| -> f32 { StandardNormal.sample(rng) }));
+    }
+}
+
+impl Shard {
+    fn losses(&mut self, policy: &Policy, batch: Batch, rows: &[usize], noise: &[f32], choices: &Choices) {
+        let unit = &policy.action_scaling().std;
+        let sigma: [f32; JOINTS] = std::array::from_fn(|i| policy.log_std[i].exp());
+        // L_BC = scale * sum over rows and entries of weight_i * (standardised error)^2
+        let (weight, scale): ([f32; JOINTS], f32) = match choices.objective {
+            Objective::RawSum => (std::array::from_fn(|i| unit[i] * unit[i]), 1.0 / batch.demos as f32),
+            Objective::StandardisedMean => ([1.0; JOINTS], 1.0 / (batch.rows.len() * JOINTS) as f32),
+        };
+        self.d_bc.resize(rows.len() * JOINTS, 0.0);
+        (self.loss, self.agreement) = (0.0, 0.0);
+        (self.residual2, self.d_log_std) = ([0.0; JOINTS], [0.0; JOINTS]);
+        for (slot, r) in rows.iter().enumerate() {
+            let (label, at) = (row(&batch.samples.targets, JOINTS, *r), slot * JOINTS);
+            let eps = noise.get(at..at + JOINTS);
+            let (mut loss, mut error2) = (0.0f32, 0.0f32);
+            for i in 0..JOINTS {
+                let residual = self.pass.output[at + i] - label[i];
+                let shift = match (choices.action, eps) {
+                    (ActionChoice::Sample, Some(eps)) => sigma[i] * eps[i],
+                    _ => 0.0,
+                };
+                let error = residual + shift;
+                let slope = 2.0 * scale * weight[i] * error;
+                loss += weight[i] * error * error;
+                error2 += residual * residual;
+                self.residual2[i] += residual * residual;
+                self.d_bc[at + i] = slope;
+                self.d_log_std[i] += slope * shift;
+            }
+            self.loss += f64::from(scale * loss);
+            self.agreement += match (choices.convergence, eps) {
+                (Convergence::SampledDensity, Some(eps)) => gaussian::sample_density(&policy.log_std, unit, eps),
+                _ => f64::from((-0.5 * error2 / (JOINTS as f32 * choices.tau * choices.tau)).exp()),
+            };
+        }
+    }
+}
+
+impl Workspace {
+    fn collect(&mut self, policy: &Policy, rows: usize, action: ActionChoice) -> Cloned {
+        let (mut cloned, mut residual2) = (Cloned::default(), [0.0f32; JOINTS]);
+        self.mean.clear();
+        self.d_log_std = [0.0; JOINTS];
+        for shard in &self.shards[..self.active] {
+            cloned.l_bc += shard.loss;
+            cloned.d_conv += shard.agreement / rows as f64;
+            shards::add_scaled(&mut residual2, &shard.residual2, 1.0 / rows as f32);
+            shards::add_scaled(&mut self.d_log_std, &shard.d_log_std, 1.0);
+            self.mean.extend_from_slice(&shard.pass.output[..shard.d_bc.len()]);
+        }
+        if action == ActionChoice::Mean {
+            gaussian::add_nll_gradient(&policy.log_std, &residual2, &mut self.d_log_std);
+        }
+        cloned
+    }
+}
+
+/// gradient = grad_theta of bc_weight * L_BC + first_weight * (sum over rows of d_first . mu), by one backward pass over the batch of
+/// the last [`behavior_cloning`]. `d_first` (rows x 9, or empty) is what state cloning sends back to the mean actions in the demos'
+/// own states.
+pub fn policy_gradient(
+    policy: &Policy,
+    (bc_weight, first_weight): (f32, f32),
+    d_first: &[f32],
+    work: &mut Workspace,
+    gradient: &mut [f32],
+) {
+    let mut from = 0;
+    let parts = work.shards[..work.active].iter_mut().map(|shard| {
+        let start = from;
+        from += shard.d_bc.len();
+        (shard, d_first.get(start..from))
+    });
+    let mut parts: [Option<(&mut Shard, Option<&[f32]>)>; shards::MAX_SHARDS] = collect_array(parts);
+    parts.par_iter_mut().flatten().for_each(|(shard, d_first)| {
+        let rows = shard.d_bc.len() / JOINTS;
+        for (d, bc) in shard.pass.d_output.iter_mut().zip(&shard.d_bc) {
+            *d = bc_weight * bc;
+        }
+        if let Some(d_first) = d_first {
+            shards::add_scaled(&mut shard.pass.d_output, d_first, first_weight);
+        }
+        policy.net.backward(&mut shard.pass, 0..rows);
+        shard.gradient.clear();
+        shard.gradient.resize(policy.net.params().len(), 0.0);
+        policy.net.add_gradient(&shard.pass, 0..rows, &mut shard.gradient);
+    });
+    gradient.fill(0.0);
+    work.shards[..work.active].iter().for_each(|shard| shards::add_scaled(gradient, &shard.gradient, 1.0));
+}
+
+fn collect_array<T, const N: usize>(items: impl Iterator<Item = T>) -> [Option<T>; N] {
+    let mut array = std::array::from_fn(|_| None);
+    array.iter_mut().zip(items).for_each(|(slot, item)| *slot = Some(item));
+    array
+}

@@ -1,0 +1,139 @@
+//! All demos side by side: transition r of the corpus is (s_t, a_t, s_{t+1}) of one demo, transitions of a demo are consecutive.
+
+use super::dynamics::Dynamics;
+use super::policy::Policy;
+use crate::demo::Demo;
+use crate::error::{Error, Result};
+use crate::state::{BASE_DIM, JOINTS};
+use crate::tasks::Task;
+use std::ops::Range;
+
+/// Transitions of many demos, row-major.
+pub struct Corpus {
+    /// The task.
+    pub task: Task,
+    /// First transition of each demo, and the end of the last.
+    pub starts: Vec<usize>,
+    /// s_t, `task.state_dim()` wide.
+    pub states: Vec<f32>,
+    /// The entries of s_{t+1} that change during an episode, [`BASE_DIM`] wide.
+    pub next: Vec<f32>,
+    /// Commanded actions \[rad/s\].
+    pub commanded: Vec<f32>,
+    /// Executed actions \[rad/s\].
+    pub executed: Vec<f32>,
+}
+
+/// Inputs and targets of a network, computed once.
+pub struct Samples {
+    /// Rows of the network's input width.
+    pub inputs: Vec<f32>,
+    /// Rows of its output width.
+    pub targets: Vec<f32>,
+}
+
+impl Corpus {
+    /// Collects `demos`; `what` names them in errors ("training", "validation").
+    ///
+    /// # Errors
+    /// [`Error::Failed`] when there is no demo or tasks are mixed.
+    pub fn new(demos: &[Demo], what: &str) -> Result<Self> {
+        let Some(first) = demos.first() else {
+            return Err(Error::Failed(format!("there is no {what} demo: record more episodes, or look at why all failed")));
+        };
+        let task = first.task();
+        if let Some(other) = demos.iter().find(|d| d.task() != task) {
+            return Err(Error::Failed(format!("{what} demos of {task} and {} are mixed; give one task's", other.task())));
+        }
+        let mut corpus = Corpus { task, starts: vec![0], states: vec![], next: vec![], commanded: vec![], executed: vec![] };
+        for demo in demos {
+            for t in 0..demo.len() {
+                corpus.states.extend_from_slice(demo.state(t));
+                corpus.next.extend_from_slice(&demo.state(t + 1)[..BASE_DIM]);
+            }
+            corpus.commanded.extend_from_slice(demo.actions());
+            corpus.executed.extend_from_slice(demo.executed());
+            corpus.starts.push(corpus.commanded.len() / JOINTS);
+        }
+        Ok(corpus)
+    }
+
+    /// Number of transitions.
+    pub fn rows(&self) -> usize {
+        self.commanded.len() / JOINTS
+    }
+
+    /// Number of demos.
+    pub fn demos(&self) -> usize {
+        self.starts.len() - 1
+    }
+
+    /// Transitions of a demo.
+    pub fn demo(&self, i: usize) -> Range<usize> {
+        self.starts[i]..self.starts[i + 1]
+    }
+
+    /// Transitions of some demos, one after another.
+    pub fn rows_of(&self, demos: &[usize]) -> Vec<usize> {
+        demos.iter().flat_map(|i| self.demo(*i)).collect()
+    }
+
+    /// s_t of transition `r`.
+    pub fn state(&self, r: usize) -> &[f32] {
+        row(&self.states, self.task.state_dim(), r)
+    }
+
+    /// What behavior cloning learns: the policy's inputs and the standardised commanded actions.
+    pub fn policy_samples(&self, policy: &Policy) -> Samples {
+        let (features, width) = (policy.features(), policy.features().width());
+        let mut inputs = vec![0.0; self.rows() * width];
+        for (r, out) in inputs.chunks_exact_mut(width).enumerate() {
+            features.forward(self.state(r), &features.hand(self.state(r)), out);
+        }
+        let scaling = policy.action_scaling();
+        let targets = self.commanded.iter().enumerate().map(|(i, a)| scaling.apply(i % JOINTS, *a)).collect();
+        Samples { inputs, targets }
+    }
+
+    /// What the dynamics network learns from the observed transitions: its inputs, and what it must add, standardised.
+    pub fn model_samples(&self, dynamics: &Dynamics) -> Samples {
+        let width = dynamics.inputs();
+        let (mut inputs, mut targets) = (vec![0.0; self.rows() * width], vec![0.0; self.rows() * BASE_DIM]);
+        for r in 0..self.rows() {
+            let (state, action) = (self.state(r), row(&self.executed, JOINTS, r));
+            dynamics.write_inputs(state, action, &mut inputs[r * width..(r + 1) * width]);
+            let target = &mut targets[r * BASE_DIM..(r + 1) * BASE_DIM];
+            dynamics.residual_target(state, action, row(&self.next, BASE_DIM, r), target);
+        }
+        Samples { inputs, targets }
+    }
+}
+
+/// Row `r` of a row-major array.
+#[inline]
+pub fn row(array: &[f32], width: usize, r: usize) -> &[f32] {
+    &array[r * width..(r + 1) * width]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::learn::testing::demo;
+
+    #[test]
+    fn refuses_no_demos_and_mixed_tasks() {
+        let message = |demos: &[Demo]| Corpus::new(demos, "training").err().expect("refused").to_string();
+        assert!(message(&[]).contains("no training demo"));
+        let mixed = [demo(Task::Stack, 5, 0), demo(Task::PickUp, 5, 0)];
+        assert!(message(&mixed).contains("pick-up"));
+    }
+
+    #[test]
+    fn transitions_are_those_of_the_demos() {
+        let demos = [demo(Task::Stack, 5, 0), demo(Task::Stack, 3, 1)];
+        let corpus = Corpus::new(&demos, "training").expect("demos");
+        assert_eq!((corpus.rows(), corpus.demo(1)), (8, 5..8));
+        assert_eq!(corpus.state(6), demos[1].state(1));
+        assert_eq!(row(&corpus.next, BASE_DIM, 7), &demos[1].state(3)[..BASE_DIM]);
+    }
+}

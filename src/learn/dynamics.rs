@@ -1,0 +1,213 @@
+//! f_phi: the next state from a state and the action that the motors were given.
+
+use super::corpus::Corpus;
+use super::features::Features;
+use super::scaling::Scaling;
+use super::weights::{Reader, push_features, push_network, push_scaling};
+use crate::config::{PretrainSettings, Structure};
+use crate::nn::{Mlp, Pass};
+use crate::state::{Action, BASE_DIM, CONTROL_DT_S, JOINTS};
+use crate::tasks::Task;
+use crate::tensor::NamedTensor;
+use rand::Rng;
+use serde_json::{Value, json};
+
+/// Spread of an action below which it counts as constant \[rad/s\].
+const ACTION_FLOOR_RAD_S: f32 = 0.01;
+/// Spread of a change in one step below which it counts as noise (0.1 mm, 0.1 mrad, 0.1 mrad/s).
+pub(super) const STEP_FLOOR: f32 = 1e-4;
+/// Duration of a control step \[s\].
+pub(super) const DT_S: f32 = CONTROL_DT_S as f32;
+
+/// f_phi with everything needed to run it: s' = s + known change + network, entry by entry; the constants of an episode are copied.
+/// The predicted quaternion is not normalised again: over the steps of one segment it leaves unit length by less than the loss sees.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Dynamics {
+    task: Task,
+    structure: Structure,
+    features: Features,
+    action: Scaling,
+    residual: Scaling,
+    pub(super) net: Mlp,
+    settings: PretrainSettings,
+}
+
+impl Dynamics {
+    /// A network with random weights; scalings from the training demos.
+    pub(super) fn new(corpus: &Corpus, settings: &PretrainSettings, rng: &mut impl Rng) -> Self {
+        let features = Features::fit(corpus.task, settings.features, false, &corpus.states);
+        let mut widths = vec![settings.hidden_units; settings.hidden_layers + 2];
+        (widths[0], widths[settings.hidden_layers + 1]) = (features.width() + JOINTS, BASE_DIM);
+        let mut dynamics = Dynamics {
+            task: corpus.task,
+            structure: settings.structure,
+            features,
+            action: Scaling::fit(&corpus.executed, JOINTS, ACTION_FLOOR_RAD_S),
+            residual: Scaling { mean: vec![0.0; BASE_DIM], std: vec![1.0; BASE_DIM] },
+            net: Mlp::new(&widths, settings.activation, rng),
+            settings: settings.clone(),
+        };
+        dynamics.residual = Scaling::fit(&corpus.model_samples(&dynamics).targets, BASE_DIM, STEP_FLOOR);
+        dynamics
+    }
+
+    /// The task it was trained on.
+    pub fn task(&self) -> Task {
+        self.task
+    }
+
+    /// The settings it was trained with.
+    pub fn settings(&self) -> &PretrainSettings {
+        &self.settings
+    }
+
+    pub(super) fn features(&self) -> &Features {
+        &self.features
+    }
+
+    pub(super) fn action_scaling(&self) -> &Scaling {
+        &self.action
+    }
+
+    pub(super) fn residual_scaling(&self) -> &Scaling {
+        &self.residual
+    }
+
+    pub(super) fn structure(&self) -> Structure {
+        self.structure
+    }
+
+    /// Number of network inputs.
+    pub(super) fn inputs(&self) -> usize {
+        self.features.width() + JOINTS
+    }
+
+    /// The network's inputs for a state and an action \[rad/s\].
+    pub(super) fn write_inputs(&self, state: &[f32], action: &[f32], out: &mut [f32]) {
+        let (seen, given) = out.split_at_mut(self.features.width());
+        self.features.forward(state, &self.features.hand(state), seen);
+        self.write_action(action, given);
+    }
+
+    /// The last nine inputs.
+    pub(super) fn write_action(&self, action: &[f32], given: &mut [f32]) {
+        given.iter_mut().zip(action).enumerate().for_each(|(i, (slot, a))| *slot = self.action.apply(i, *a));
+    }
+
+    /// The change that is known before learning.
+    fn known_change(&self, i: usize, state: &[f32], action: &[f32]) -> f32 {
+        match self.structure {
+            Structure::Kinematic if i < JOINTS => DT_S * action[i],
+            Structure::Kinematic if i < 2 * JOINTS => action[i - JOINTS] - state[i],
+            _ => 0.0,
+        }
+    }
+
+    /// The next state's changing entries from the network's output.
+    pub(super) fn write_next(&self, state: &[f32], action: &[f32], output: &[f32], next: &mut [f32]) {
+        for (i, slot) in next.iter_mut().enumerate() {
+            *slot = state[i] + self.known_change(i, state, action) + self.residual.undo(i, output[i]);
+        }
+    }
+
+    /// What the network must put out for the observed `next`.
+    pub(super) fn residual_target(&self, state: &[f32], action: &[f32], next: &[f32], target: &mut [f32]) {
+        for (i, slot) in target.iter_mut().enumerate() {
+            *slot = self.residual.apply(i, next[i] - state[i] - self.known_change(i, state, action));
+        }
+    }
+
+    /// Predicted next state row after `action` \[rad/s\] in `state_row`.
+    ///
+    /// # Panics
+    /// When the row is not the task's.
+    pub fn predict(&self, state_row: &[f32], action: &Action) -> Vec<f32> {
+        assert_eq!(state_row.len(), self.task.state_dim(), "the row of another task than {}", self.task);
+        let action = action.map(|v| v as f32);
+        let mut pass = Pass::new(&self.net, 1);
+        self.write_inputs(state_row, &action, &mut pass.input);
+        self.net.forward(&mut pass, 0..1);
+        let mut next = state_row.to_vec();
+        self.write_next(state_row, &action, &pass.output, &mut next[..BASE_DIM]);
+        next
+    }
+
+    /// All arrays.
+    pub fn to_tensors(&self) -> Vec<NamedTensor> {
+        let mut out = Vec::new();
+        push_features(&mut out, "dynamics", &self.features);
+        push_scaling(&mut out, "dynamics.action", &self.action);
+        push_scaling(&mut out, "dynamics.residual", &self.residual);
+        push_network(&mut out, "dynamics", &self.net);
+        out
+    }
+
+    /// All that is not an array.
+    pub fn meta(&self) -> Value {
+        let (features, mask_dq) = self.features.choice();
+        let widths = self.net.widths();
+        json!({
+            "network": "dynamics",
+            "task": self.task,
+            "state_dim": self.task.state_dim(),
+            "features": features,
+            "mask_dq": mask_dq,
+            "structure": self.structure,
+            "activation": self.net.activation(),
+            "hidden": &widths[1..widths.len() - 1],
+            "settings": self.settings,
+        })
+    }
+
+    /// The inverse of [`Dynamics::to_tensors`] and [`Dynamics::meta`].
+    ///
+    /// # Errors
+    /// Says what is missing or does not fit, with both numbers.
+    pub fn from_tensors(tensors: &[NamedTensor], meta: &Value) -> Result<Self, String> {
+        let reader = Reader { tensors, meta };
+        let task = reader.task("dynamics")?;
+        let features = reader.features("dynamics", task)?;
+        let net = reader.network("dynamics", features.width() + JOINTS, BASE_DIM)?;
+        Ok(Dynamics {
+            task,
+            structure: reader.meta("structure")?,
+            features,
+            action: reader.scaling("dynamics.action", JOINTS)?,
+            residual: reader.scaling("dynamics.residual", BASE_DIM)?,
+            net,
+            settings: reader.meta("settings")?,
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::learn::testing::demos;
+    use crate::seed::stream;
+
+    #[test]
+    fn dynamics_survive_their_tensors_and_copy_the_context() {
+        let corpus = Corpus::new(&demos(Task::Stack, 3, 20, 0), "training").expect("demos");
+        for structure in [Structure::Plain, Structure::Kinematic] {
+            let settings = PretrainSettings { structure, ..Default::default() };
+            let dynamics = Dynamics::new(&corpus, &settings, &mut stream(0, "test", 0));
+            let back = Dynamics::from_tensors(&dynamics.to_tensors(), &dynamics.meta());
+            assert_eq!(back.as_ref(), Ok(&dynamics));
+            let next = dynamics.predict(corpus.state(4), &[0.1; JOINTS]);
+            assert_eq!(next[BASE_DIM..], corpus.state(4)[BASE_DIM..]);
+        }
+    }
+
+    #[test]
+    fn the_target_undoes_the_prediction() {
+        let corpus = Corpus::new(&demos(Task::PickUp, 2, 20, 0), "training").expect("demos");
+        let dynamics = Dynamics::new(&corpus, &PretrainSettings::default(), &mut stream(0, "test", 0));
+        let samples = corpus.model_samples(&dynamics);
+        let mut next = vec![0.0; BASE_DIM];
+        dynamics.write_next(corpus.state(7), &corpus.executed[63..72], &samples.targets[7 * BASE_DIM..8 * BASE_DIM], &mut next);
+        for (a, b) in next.iter().zip(&corpus.next[7 * BASE_DIM..]) {
+            assert!((a - b).abs() < 1e-6, "{a} against {b}");
+        }
+    }
+}

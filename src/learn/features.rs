@@ -1,0 +1,221 @@
+//! What a network sees of a state, and how a gradient comes back through it.
+
+use super::hand::{Chain, Hand, Vec3, add, cross, scale, sub, turn, turn_back};
+use super::scaling::Scaling;
+use crate::config::FeatureSet;
+use crate::nn::activation::tanh;
+use crate::state::{BASE_DIM, JOINTS};
+use crate::tasks::{REST_HEIGHT_M, Task};
+
+/// Spread below which a state entry counts as constant (1 cm, 0.01 rad, 0.01 rad/s, 0.01 of a quaternion).
+const STATE_FLOOR: f32 = 0.01;
+/// Range of the near features \[m\].
+const NEAR_M: f32 = 0.015;
+/// Column of the block's position in a state row.
+const BLOCK: usize = 2 * JOINTS;
+/// Tool position, two columns of the hand's rotation, block in the hand's frame.
+const HAND_WIDTH: usize = 12;
+
+/// The map from a state row to a network's inputs: kept state entries, then what kinematics derive, then the near features.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Features {
+    task: Task,
+    set: FeatureSet,
+    mask_dq: bool,
+    kept: Vec<usize>,
+    state: Scaling,
+    derived: Scaling,
+    chain: Chain,
+}
+
+/// Hand, block in the hand's frame, and goal minus block: what the derived features are made of.
+struct Relations {
+    block_in_hand: Vec3,
+    goal_minus_block: Option<Vec3>,
+}
+
+impl Features {
+    /// Fits the scaling to `states` (row-major, `task.state_dim()` wide).
+    pub fn fit(task: Task, set: FeatureSet, mask_dq: bool, states: &[f32]) -> Self {
+        let state = Scaling::fit(states, task.state_dim(), STATE_FLOOR);
+        let width = derived_width(task, set);
+        let plain = Scaling { mean: vec![0.0; width], std: vec![1.0; width] };
+        let mut features = Self::from_scaling(task, set, mask_dq, state, plain);
+        if width > 0 {
+            let mut rows = Vec::with_capacity(states.len() / task.state_dim() * width);
+            let mut row = vec![0.0; features.width()];
+            for state in states.chunks_exact(task.state_dim()) {
+                features.forward(state, &features.hand(state), &mut row);
+                rows.extend_from_slice(&row[features.kept.len()..features.kept.len() + width]);
+            }
+            features.derived = Scaling::fit(&rows, width, STATE_FLOOR);
+        }
+        features
+    }
+
+    /// From known scalings, e.g. those of a file; their widths must be the task's and [`derived_width`]'s.
+    pub fn from_scaling(task: Task, set: FeatureSet, mask_dq: bool, state: Scaling, derived: Scaling) -> Self {
+        let kept = (0..task.state_dim()).filter(|i| !(mask_dq && (JOINTS..2 * JOINTS).contains(i))).collect();
+        Features { task, set, mask_dq, kept, state, derived, chain: Chain::default() }
+    }
+
+    /// Number of network inputs.
+    pub fn width(&self) -> usize {
+        self.kept.len() + self.derived.width() + self.near_width()
+    }
+
+    fn near_width(&self) -> usize {
+        if self.set == FeatureSet::FkNear { self.derived.width() - HAND_WIDTH + 3 } else { 0 }
+    }
+
+    /// Statistics of the state entries.
+    pub fn state_scaling(&self) -> &Scaling {
+        &self.state
+    }
+
+    /// Statistics of the derived entries.
+    pub fn derived_scaling(&self) -> &Scaling {
+        &self.derived
+    }
+
+    /// The set, and whether dq is left out.
+    pub fn choice(&self) -> (FeatureSet, bool) {
+        (self.set, self.mask_dq)
+    }
+
+    /// Whether the inputs depend on where the hand is.
+    pub fn needs_hand(&self) -> bool {
+        self.set != FeatureSet::Raw
+    }
+
+    /// Where the hand is in this state; all zeros when these features do not need it.
+    pub fn hand(&self, state: &[f32]) -> Hand {
+        if self.needs_hand() { self.chain.hand(state) } else { Hand::default() }
+    }
+
+    fn relations(&self, state: &[f32], hand: &Hand) -> Relations {
+        let block = vec3(state, BLOCK);
+        let goal = match self.task {
+            Task::PickUp => None,
+            Task::PickAndPlace => Some(vec3(state, BASE_DIM)),
+            Task::Stack => Some(add(vec3(state, BASE_DIM), [0.0, 0.0, 2.0 * REST_HEIGHT_M as f32])),
+        };
+        Relations {
+            block_in_hand: turn_back(&hand.columns, sub(block, hand.tool)),
+            goal_minus_block: goal.map(|goal| sub(goal, block)),
+        }
+    }
+
+    /// Writes the inputs of one state into `out` (`width()` numbers).
+    pub fn forward(&self, state: &[f32], hand: &Hand, out: &mut [f32]) {
+        let (kept, rest) = out.split_at_mut(self.kept.len());
+        for (slot, i) in kept.iter_mut().zip(&self.kept) {
+            *slot = self.state.apply(*i, state[*i]);
+        }
+        if !self.needs_hand() {
+            return;
+        }
+        let (derived, near) = rest.split_at_mut(self.derived.width());
+        let relations = self.relations(state, hand);
+        let parts = [hand.tool, hand.columns[0], hand.columns[1], relations.block_in_hand];
+        let values = parts.iter().chain(&relations.goal_minus_block).flatten();
+        for (i, (slot, value)) in derived.iter_mut().zip(values).enumerate() {
+            *slot = self.derived.apply(i, *value);
+        }
+        let close = [relations.block_in_hand].into_iter().chain(relations.goal_minus_block).flatten();
+        near.iter_mut().zip(close).for_each(|(slot, value)| *slot = tanh(value / NEAR_M));
+    }
+
+    /// Adds to `d_state` the gradient that `d_inputs` sends back to the entries of the state that change during an episode;
+    /// `inputs` is what [`Features::forward`] wrote.
+    pub fn backward(&self, state: &[f32], hand: &Hand, inputs: &[f32], d_inputs: &[f32], d_state: &mut [f32]) {
+        for (i, d) in self.kept.iter().zip(d_inputs).take_while(|(i, _)| **i < BASE_DIM) {
+            d_state[*i] += d / self.state.std[*i];
+        }
+        if !self.needs_hand() {
+            return;
+        }
+        let from = self.kept.len();
+        let near_from = from + self.derived.width();
+        let derived = |at: usize| -> Vec3 { std::array::from_fn(|k| d_inputs[from + at + k] / self.derived.std[at + k]) };
+        let near = |at: usize| -> Vec3 {
+            let entry = near_from + at;
+            if self.near_width() == 0 {
+                return [0.0; 3];
+            }
+            std::array::from_fn(|k| d_inputs[entry + k] * (1.0 - inputs[entry + k] * inputs[entry + k]) / NEAR_M)
+        };
+        // block in hand = R^T (block - tool); its gradient in the world's frame pulls at the block and pushes at the hand
+        let pull = turn(&hand.columns, add(derived(9), near(0)));
+        let arm = sub(vec3(state, BLOCK), hand.tool);
+        let force = sub(derived(0), pull);
+        let turns = add(cross(hand.columns[0], derived(3)), cross(hand.columns[1], derived(6)));
+        hand.add_joint_gradient(force, sub(turns, cross(arm, pull)), d_state);
+        let mut d_block = pull;
+        if self.task != Task::PickUp {
+            d_block = add(d_block, scale(add(derived(HAND_WIDTH), near(3)), -1.0));
+        }
+        d_state[BLOCK..].iter_mut().zip(d_block).for_each(|(slot, d)| *slot += d);
+    }
+}
+
+/// Number of derived entries of a feature set.
+pub fn derived_width(task: Task, set: FeatureSet) -> usize {
+    match set {
+        FeatureSet::Raw => 0,
+        FeatureSet::Fk | FeatureSet::FkNear => HAND_WIDTH + if task == Task::PickUp { 0 } else { 3 },
+    }
+}
+
+fn vec3(row: &[f32], at: usize) -> Vec3 {
+    [row[at], row[at + 1], row[at + 2]]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::learn::testing::{demo, random_states};
+
+    #[test]
+    fn features_gradients_equal_finite_differences() {
+        for (task, set, mask_dq) in [
+            (Task::PickUp, FeatureSet::FkNear, false),
+            (Task::PickAndPlace, FeatureSet::Fk, true),
+            (Task::Stack, FeatureSet::FkNear, true),
+            (Task::Stack, FeatureSet::Raw, false),
+        ] {
+            let states = random_states(task, 20, 7);
+            let features = Features::fit(task, set, mask_dq, &states);
+            let state = &states[..task.state_dim()];
+            let weights: Vec<f32> = (0..features.width()).map(|i| ((i * 29 % 13) as f32 - 6.0) / 6.0).collect();
+            let loss = |state: &[f32]| -> f64 {
+                let mut out = vec![0.0; features.width()];
+                features.forward(state, &features.hand(state), &mut out);
+                out.iter().zip(&weights).map(|(o, w)| f64::from(o * w)).sum()
+            };
+            let mut inputs = vec![0.0; features.width()];
+            features.forward(state, &features.hand(state), &mut inputs);
+            let mut gradient = vec![0.0; BASE_DIM];
+            features.backward(state, &features.hand(state), &inputs, &weights, &mut gradient);
+            for (i, analytic) in gradient.iter().enumerate() {
+                let h = 1e-3;
+                let at = |sign: f32| {
+                    let mut moved = state.to_vec();
+                    moved[i] += sign * h;
+                    loss(&moved)
+                };
+                let numeric = (at(1.0) - at(-1.0)) / f64::from(2.0 * h);
+                let error = (numeric - f64::from(*analytic)).abs();
+                assert!(error < 0.02 * (1.0 + numeric.abs()), "{task} {set:?} entry {i}: {analytic} against {numeric}");
+            }
+        }
+    }
+
+    #[test]
+    fn masking_leaves_out_the_nine_velocities() {
+        let demo = demo(Task::Stack, 30, 1);
+        let width = |mask| Features::fit(Task::Stack, FeatureSet::FkNear, mask, demo.states()).width();
+        assert_eq!(width(false), 32 + 15 + 6);
+        assert_eq!(width(true), width(false) - JOINTS);
+    }
+}

@@ -1,0 +1,163 @@
+//! The hand's pose from the arm's joint angles in f32, with what its derivative needs: per joint, axis and origin in the world.
+
+use crate::robot::jaco::TOOL_IN_HAND_M;
+use crate::robot::kinematics::Arm;
+use crate::state::ARM_JOINTS;
+use std::f32::consts::FRAC_2_PI;
+
+/// A vector.
+pub type Vec3 = [f32; 3];
+
+/// Where hand and joints are at some joint angles.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Hand {
+    /// Tool point \[m\].
+    pub tool: Vec3,
+    /// Columns of `world_from_hand`.
+    pub columns: [Vec3; 3],
+    /// World axis of each arm joint.
+    pub axes: [Vec3; ARM_JOINTS],
+    /// World position of each arm joint \[m\].
+    pub origins: [Vec3; ARM_JOINTS],
+}
+
+/// The fixed transforms of the arm, in f32.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Chain {
+    rotations: [[Vec3; 3]; ARM_JOINTS],
+    offsets: [Vec3; ARM_JOINTS],
+}
+
+impl Default for Chain {
+    fn default() -> Self {
+        let arm = Arm::new();
+        let column = |i: usize, c: usize| {
+            let matrix = arm.origin(i).rotation.to_rotation_matrix();
+            std::array::from_fn(|r| matrix[(r, c)] as f32)
+        };
+        Chain {
+            rotations: std::array::from_fn(|i| std::array::from_fn(|c| column(i, c))),
+            offsets: std::array::from_fn(|i| std::array::from_fn(|r| arm.origin(i).translation.vector[r] as f32)),
+        }
+    }
+}
+
+impl Chain {
+    /// The hand at joint angles `q` (the arm's six are read) \[rad\].
+    pub fn hand(&self, q: &[f32]) -> Hand {
+        let mut hand = Hand { columns: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]], ..Hand::default() };
+        let mut position = [0.0; 3];
+        for i in 0..ARM_JOINTS {
+            position = add(position, turn(&hand.columns, self.offsets[i]));
+            let [x, y, z] = self.rotations[i].map(|column| turn(&hand.columns, column));
+            let (sin, cos) = sin_cos(q[i]);
+            hand.columns = [add(scale(x, cos), scale(y, sin)), add(scale(y, cos), scale(x, -sin)), z];
+            hand.axes[i] = z;
+            hand.origins[i] = position;
+        }
+        hand.tool = add(position, turn(&hand.columns, TOOL_IN_HAND_M.map(|v| v as f32)));
+        hand
+    }
+}
+
+impl Hand {
+    /// Adds to `d_q` the gradient that reaches the joints when a force `f` pulls at the tool point and a moment `m` turns the hand:
+    /// joint i gets z_i . ((p - o_i) x f + m).
+    pub fn add_joint_gradient(&self, f: Vec3, m: Vec3, d_q: &mut [f32]) {
+        for i in 0..ARM_JOINTS {
+            let lever = sub(self.tool, self.origins[i]);
+            d_q[i] += dot(self.axes[i], add(cross(lever, f), m));
+        }
+    }
+}
+
+/// pi / 2 in two parts, so that x - n pi / 2 keeps its digits.
+const HALF_PI_HIGH: f32 = 1.570_796_4;
+const HALF_PI_LOW: f32 = -4.371_139e-8;
+
+/// Sine and cosine to about 2e-7 for |x| up to a few dozen turns; the same bytes on every platform, unlike the system's.
+pub fn sin_cos(x: f32) -> (f32, f32) {
+    let turns = (x * FRAC_2_PI).round_ties_even();
+    let f = (x - turns * HALF_PI_HIGH) - turns * HALF_PI_LOW;
+    let f2 = f * f;
+    // Taylor series on |f| <= pi / 4; the first terms left out are worth 2e-9 and 2e-8.
+    let sin = f * (1.0 + f2 * (-1.0 / 6.0 + f2 * (1.0 / 120.0 + f2 * (-1.0 / 5040.0 + f2 / 362_880.0))));
+    let cos = 1.0 + f2 * (-0.5 + f2 * (1.0 / 24.0 + f2 * (-1.0 / 720.0 + f2 / 40_320.0)));
+    match (turns as i64).rem_euclid(4) {
+        0 => (sin, cos),
+        1 => (cos, -sin),
+        2 => (-sin, -cos),
+        _ => (-cos, sin),
+    }
+}
+
+/// a + b.
+pub fn add(a: Vec3, b: Vec3) -> Vec3 {
+    [a[0] + b[0], a[1] + b[1], a[2] + b[2]]
+}
+
+/// a - b.
+pub fn sub(a: Vec3, b: Vec3) -> Vec3 {
+    [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
+}
+
+/// a times s.
+pub fn scale(a: Vec3, s: f32) -> Vec3 {
+    [a[0] * s, a[1] * s, a[2] * s]
+}
+
+/// a . b.
+pub fn dot(a: Vec3, b: Vec3) -> f32 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
+/// a x b.
+pub fn cross(a: Vec3, b: Vec3) -> Vec3 {
+    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+}
+
+/// R v, R given by its columns.
+pub fn turn(columns: &[Vec3; 3], v: Vec3) -> Vec3 {
+    add(add(scale(columns[0], v[0]), scale(columns[1], v[1])), scale(columns[2], v[2]))
+}
+
+/// R^T v.
+pub fn turn_back(columns: &[Vec3; 3], v: Vec3) -> Vec3 {
+    [dot(columns[0], v), dot(columns[1], v), dot(columns[2], v)]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::robot::jaco::READY_Q_RAD;
+
+    #[test]
+    fn sine_and_cosine_are_close() {
+        for i in -40_000..40_000 {
+            let x = i as f32 * 1e-3;
+            let (sin, cos) = sin_cos(x);
+            assert!((f64::from(sin) - f64::from(x).sin()).abs() < 3e-7, "sin {x}");
+            assert!((f64::from(cos) - f64::from(x).cos()).abs() < 3e-7, "cos {x}");
+        }
+    }
+
+    #[test]
+    fn the_hand_is_where_the_arms_own_kinematics_have_it() {
+        let q = READY_Q_RAD.map(|v| v + 0.3);
+        let hand = Chain::default().hand(&q.map(|v| v as f32));
+        let (tool, jacobian) = Arm::new().tool_jacobian(&q);
+        let matrix = tool.rotation.to_rotation_matrix();
+        for r in 0..3 {
+            assert!((f64::from(hand.tool[r]) - tool.translation.vector[r]).abs() < 1e-6);
+            (0..3).for_each(|c| assert!((f64::from(hand.columns[c][r]) - matrix[(r, c)]).abs() < 1e-6));
+            let (mut along, mut about) = ([0.0; ARM_JOINTS], [0.0; ARM_JOINTS]);
+            let unit = std::array::from_fn(|k| if k == r { 1.0 } else { 0.0 });
+            hand.add_joint_gradient(unit, [0.0; 3], &mut along);
+            hand.add_joint_gradient([0.0; 3], unit, &mut about);
+            for i in 0..ARM_JOINTS {
+                assert!((f64::from(along[i]) - jacobian[(r, i)]).abs() < 1e-5);
+                assert!((f64::from(about[i]) - jacobian[(r + 3, i)]).abs() < 1e-5);
+            }
+        }
+    }
+}

@@ -1,0 +1,255 @@
+//! The state of training between updates: networks, optimisers, workspaces, and the single steps that Algorithm 1 is made of.
+
+use super::behavior_cloning::{self as bc, Cloned, draw_noise, policy_gradient};
+use super::corpus::{Corpus, Samples};
+use super::dynamics::Dynamics;
+use super::metrics::{EpochMetrics, action_errors};
+use super::policy::Policy;
+use super::pretrain_dynamics::{model_loss, validation_loss};
+use super::regression::Regression;
+use super::shards::add_scaled;
+use super::state_cloning::{self as sc, Segment, draw_segments};
+use crate::config::{ActionChoice, TrainSettings};
+use crate::demo::Demo;
+use crate::error::{Error, Result};
+use crate::nn::{Adam, Ema, clip_by_global_norm, gaussian, global_norm};
+use crate::seed::stream;
+
+/// A parameter vector's way down.
+struct Descent {
+    adam: Adam,
+    ema: Ema,
+}
+
+impl Descent {
+    fn new(params: &[f32], ema_decay: f64) -> Self {
+        Descent { adam: Adam::new(params.len()), ema: Ema::new(params, ema_decay) }
+    }
+}
+
+/// The dynamics network with what its fine-tuning and the rollouts through it need.
+struct Model {
+    dynamics: Dynamics,
+    samples: Samples,
+    held_out: Samples,
+    adam: Adam,
+    work: Regression,
+}
+
+/// See the module.
+pub(super) struct Learner {
+    pub seed: u64,
+    pub corpus: Corpus,
+    /// Updates of the present stage.
+    pub updates: u64,
+    skipped: u64,
+    settings: TrainSettings,
+    policy: Policy,
+    averaged: Policy,
+    samples: Samples,
+    held_out: Corpus,
+    held_out_samples: Samples,
+    model: Option<Model>,
+    net_descent: Descent,
+    std_descent: Descent,
+    bc_choices: bc::Choices,
+    sc_choices: sc::Choices,
+    bc_work: bc::Workspace,
+    sc_work: sc::Workspace,
+    validation_work: bc::Workspace,
+    segments: Vec<Segment>,
+    sc_noise: Vec<f32>,
+    gradient: Vec<f32>,
+    /// Counts updates of all stages: the number of the random streams.
+    draws: u64,
+}
+
+impl Learner {
+    pub fn new(
+        train: &[Demo],
+        validation: &[Demo],
+        dynamics: Option<Dynamics>,
+        settings: &TrainSettings,
+        seed: u64,
+    ) -> Result<Self> {
+        let (corpus, held_out) = (Corpus::new(train, "training")?, Corpus::new(validation, "validation")?);
+        let tasks = [Some(held_out.task), dynamics.as_ref().map(Dynamics::task)];
+        if let Some(other) = tasks.into_iter().flatten().find(|t| *t != corpus.task) {
+            return Err(Error::Failed(format!(
+                "the training demos are of {} (states of {} numbers), but validation demos or dynamics network of {other} ({})",
+                corpus.task,
+                corpus.task.state_dim(),
+                other.state_dim()
+            )));
+        }
+        let policy = Policy::new(&corpus, settings, &mut stream(seed, "train.init", 0));
+        let model = dynamics.map(|dynamics| Model {
+            samples: corpus.model_samples(&dynamics),
+            held_out: held_out.model_samples(&dynamics),
+            adam: Adam::new(dynamics.net.params().len()),
+            work: Regression::default(),
+            dynamics,
+        });
+        Ok(Learner {
+            seed,
+            updates: 0,
+            skipped: 0,
+            samples: corpus.policy_samples(&policy),
+            held_out_samples: held_out.policy_samples(&policy),
+            model,
+            net_descent: Descent::new(policy.net.params(), settings.ema_decay),
+            std_descent: Descent::new(&policy.log_std, settings.ema_decay),
+            bc_choices: bc::Choices::new(settings),
+            sc_choices: sc::Choices::new(settings, &corpus),
+            bc_work: bc::Workspace::default(),
+            sc_work: sc::Workspace::default(),
+            validation_work: bc::Workspace::default(),
+            segments: Vec::new(),
+            sc_noise: Vec::new(),
+            gradient: vec![0.0; policy.net.params().len()],
+            draws: 0,
+            settings: settings.clone(),
+            averaged: policy.clone(),
+            policy,
+            corpus,
+            held_out,
+        })
+    }
+
+    /// Mean number of actions of a training demo.
+    pub fn mean_length(&self) -> f64 {
+        self.corpus.rows() as f64 / self.corpus.demos() as f64
+    }
+
+    /// Fresh optimisers; the average starts at the present weights.
+    pub fn begin_stage(&mut self) {
+        self.updates = 0;
+        self.net_descent = Descent::new(self.policy.net.params(), self.settings.ema_decay);
+        self.std_descent = Descent::new(&self.policy.log_std, self.settings.ema_decay);
+    }
+
+    /// The averaged weights become the weights.
+    pub fn end_stage(&mut self) {
+        self.policy.net.params_mut().copy_from_slice(self.net_descent.ema.average());
+        self.policy.log_std.copy_from_slice(self.std_descent.ema.average());
+    }
+
+    /// Algorithm 2 on transitions that amount to `demos` demos.
+    pub fn behavior_cloning(&mut self, rows: &[usize], demos: f64) -> Result<Cloned> {
+        self.draws += 1;
+        let mut rng = stream(self.seed, "train.bc", self.draws);
+        let batch = bc::Batch { samples: &self.samples, rows, demos };
+        let cloned = bc::behavior_cloning(&self.policy, batch, &self.bc_choices, &mut rng, &mut self.bc_work);
+        self.finite("L_BC (Eq. 3)", cloned.l_bc, "lower train.learning_rate or train.warm_start_learning_rate")?;
+        Ok(cloned)
+    }
+
+    /// Algorithm 3 on `demos`, whose transitions are `rows`; after [`Learner::behavior_cloning`] on the same.
+    pub fn state_cloning(&mut self, demos: &[usize], rows: &[usize]) -> Result<f64> {
+        let Some(model) = &self.model else {
+            return Err(Error::Usage("state cloning needs a dynamics network: run `hilt pretrain` first".into()));
+        };
+        let mut rng = stream(self.seed, "train.sc", self.draws);
+        let choices = &self.sc_choices;
+        let lengths = demos.iter().map(|d| self.corpus.demo(*d).len());
+        draw_segments(lengths, choices.rho, choices.pairs, &mut rng, &mut self.segments);
+        draw_noise(choices.action == ActionChoice::Sample, rows.len(), &mut rng, &mut self.sc_noise);
+        let batch = sc::Batch {
+            corpus: &self.corpus,
+            model_inputs: &model.samples.inputs,
+            rows,
+            demos: demos.len(),
+            mean: &self.bc_work.mean,
+            noise: &self.sc_noise,
+        };
+        let l_sc = sc::state_cloning(&self.policy, &model.dynamics, batch, &self.segments, choices, &mut self.sc_work);
+        self.finite("L_SC (Eq. 5)", l_sc, "raise train.rho, set train.clip_norm or lower train.learning_rate")?;
+        Ok(l_sc)
+    }
+
+    fn finite(&self, term: &str, value: f64, remedy: &str) -> Result<()> {
+        if value.is_finite() {
+            return Ok(());
+        }
+        Err(Error::Failed(format!("{term} is {value} at update {}: {remedy}", self.updates + 1)))
+    }
+
+    /// Gradient of (1 - alpha) L_BC + alpha L_SC into `self.gradient`.
+    fn mixed_gradient(&mut self, bc_weight: f32, sc_weight: f32) {
+        let first: &[f32] = if sc_weight > 0.0 { &self.sc_work.d_first } else { &[] };
+        policy_gradient(&self.policy, (bc_weight, sc_weight), first, &mut self.bc_work, &mut self.gradient);
+        if sc_weight > 0.0 {
+            add_scaled(&mut self.gradient, &self.sc_work.gradient, sc_weight);
+        }
+    }
+
+    /// Norms of the gradients of L_BC and L_SC, each by itself.
+    pub fn gradient_norms(&mut self, with_sc: bool) -> (f64, f64) {
+        self.mixed_gradient(1.0, 0.0);
+        let bc = global_norm(&self.gradient);
+        if !with_sc {
+            return (bc, f64::NAN);
+        }
+        self.mixed_gradient(0.0, 1.0);
+        (bc, global_norm(&self.gradient))
+    }
+
+    /// theta <- theta - grad L_mix, by Adam. An update whose gradient is not finite (long rollouts without recovery) is left out.
+    pub fn update(&mut self, alpha: f64, learning_rate: f64) {
+        self.updates += 1;
+        self.mixed_gradient((1.0 - alpha) as f32, alpha as f32);
+        let norm = clip_by_global_norm(&mut self.gradient, self.settings.clip_norm);
+        let mut d_log_std = self.bc_work.d_log_std;
+        if self.settings.action == ActionChoice::Sample {
+            let sc = if alpha > 0.0 { self.sc_work.d_log_std } else { Default::default() };
+            d_log_std = std::array::from_fn(|i| (1.0 - alpha) as f32 * d_log_std[i] + alpha as f32 * sc[i]);
+        }
+        if !norm.is_finite() || d_log_std.iter().any(|d| !d.is_finite()) {
+            self.skipped += 1;
+            return;
+        }
+        self.net_descent.adam.step(self.policy.net.params_mut(), &self.gradient, learning_rate);
+        self.net_descent.ema.update(self.policy.net.params());
+        self.std_descent.adam.step(&mut self.policy.log_std, &d_log_std, learning_rate);
+        gaussian::floor_log_std(&mut self.policy.log_std, self.settings.std_floor.ln() as f32);
+        self.std_descent.ema.update(&self.policy.log_std);
+    }
+
+    /// One update of the dynamics network on observed transitions (Eq. 6); L_mix never reaches it.
+    pub fn fine_tune(&mut self, rows: &[usize]) -> Result<f64> {
+        let mean_length = self.mean_length() as f32;
+        let Some(Model { dynamics, samples, adam, work, .. }) = &mut self.model else {
+            return Ok(f64::NAN);
+        };
+        let loss = model_loss(dynamics, rows.len(), mean_length);
+        let l_model = work.loss(&dynamics.net, samples, rows, &loss, true);
+        clip_by_global_norm(&mut work.gradient, dynamics.settings().clip_norm);
+        adam.step(dynamics.net.params_mut(), &work.gradient, self.settings.dynamics_learning_rate);
+        self.finite("the loss of the dynamics network (Eq. 6)", l_model, "lower train.dynamics_learning_rate")?;
+        Ok(l_model)
+    }
+
+    /// Completes an epoch's metrics with the averaged weights' errors on the validation demos.
+    pub fn validate(&mut self, mut metrics: EpochMetrics) -> EpochMetrics {
+        self.averaged.net.params_mut().copy_from_slice(self.net_descent.ema.average());
+        self.averaged.log_std.copy_from_slice(self.std_descent.ema.average());
+        let rows: Vec<usize> = (0..self.held_out.rows()).collect();
+        let demos = self.held_out.demos() as f64;
+        let batch = bc::Batch { samples: &self.held_out_samples, rows: &rows, demos };
+        let mut rng = stream(self.seed, "train.validate", self.draws);
+        let work = &mut self.validation_work;
+        metrics.validation_l_bc = bc::behavior_cloning(&self.averaged, batch, &self.bc_choices, &mut rng, work).l_bc;
+        let scaling = self.averaged.action_scaling();
+        metrics.errors = action_errors(&self.held_out_samples, &work.mean, &scaling.std, &scaling.mean);
+        if let Some(model) = &mut self.model {
+            metrics.validation_l_model = validation_loss(&model.dynamics, &self.held_out, &model.held_out, &mut model.work);
+        }
+        (metrics.updates, metrics.skipped) = (self.updates, self.skipped);
+        metrics
+    }
+
+    /// The results.
+    pub fn finish(self) -> (Policy, Option<Dynamics>) {
+        (self.policy, self.model.map(|m| m.dynamics))
+    }
+}

@@ -1,0 +1,189 @@
+//! pi_theta: a Gaussian over joint velocity commands whose mean is a network of the state.
+
+use super::corpus::Corpus;
+use super::features::Features;
+use super::scaling::Scaling;
+use super::weights::{Reader, push_features, push_network, push_scaling, vector};
+use crate::config::TrainSettings;
+use crate::nn::{Mlp, Pass};
+use crate::state::JOINTS;
+use crate::tasks::Task;
+use crate::tensor::NamedTensor;
+use rand::Rng;
+use rand_distr::{Distribution, StandardNormal};
+use serde_json::{Value, json};
+
+/// Spread of the demo actions below which they count as constant \[rad/s\].
+const ACTION_FLOOR_RAD_S: f32 = 0.01;
+/// The horizon of an episode over the 95th percentile of the demos' lengths.
+const HORIZON_OVER_P95: usize = 2;
+
+/// pi_theta with everything needed to run it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Policy {
+    task: Task,
+    horizon_steps: u32,
+    features: Features,
+    action: Scaling,
+    pub(super) net: Mlp,
+    /// Log standard deviations, in units of the demo actions' own.
+    pub(super) log_std: Vec<f32>,
+    settings: TrainSettings,
+}
+
+impl Policy {
+    /// A policy with random weights; scalings and horizon from the training demos.
+    pub(super) fn new(corpus: &Corpus, settings: &TrainSettings, rng: &mut impl Rng) -> Self {
+        let features = Features::fit(corpus.task, settings.features, settings.mask_dq, &corpus.states);
+        let mut widths = vec![settings.hidden_units; settings.hidden_layers + 2];
+        (widths[0], widths[settings.hidden_layers + 1]) = (features.width(), JOINTS);
+        let mut lengths: Vec<usize> = (0..corpus.demos()).map(|i| corpus.demo(i).len()).collect();
+        lengths.sort_unstable();
+        let p95 = lengths[(lengths.len() * 95).div_ceil(100) - 1];
+        Policy {
+            task: corpus.task,
+            horizon_steps: (HORIZON_OVER_P95 * p95) as u32,
+            features,
+            action: Scaling::fit(&corpus.commanded, JOINTS, ACTION_FLOOR_RAD_S),
+            net: Mlp::new(&widths, settings.activation, rng),
+            log_std: vec![settings.initial_std.max(settings.std_floor).ln() as f32; JOINTS],
+            settings: settings.clone(),
+        }
+    }
+
+    /// The task it was trained on.
+    pub fn task(&self) -> Task {
+        self.task
+    }
+
+    /// Control steps after which an episode is given up: twice the 95th percentile of the training demos' lengths.
+    pub fn horizon_steps(&self) -> u32 {
+        self.horizon_steps
+    }
+
+    /// The settings it was trained with.
+    pub fn settings(&self) -> &TrainSettings {
+        &self.settings
+    }
+
+    pub(super) fn features(&self) -> &Features {
+        &self.features
+    }
+
+    pub(super) fn action_scaling(&self) -> &Scaling {
+        &self.action
+    }
+
+    /// Mean action in `state_row` (`task.state_dim()` numbers, see [`crate::state::State::to_row`]) \[rad/s\].
+    ///
+    /// # Panics
+    /// When the row is not the task's.
+    pub fn act(&self, state_row: &[f32]) -> [f32; JOINTS] {
+        let mean = self.mean(state_row);
+        std::array::from_fn(|i| self.action.undo(i, mean[i]))
+    }
+
+    /// An action drawn from the Gaussian \[rad/s\].
+    ///
+    /// # Panics
+    /// When the row is not the task's.
+    pub fn sample(&self, state_row: &[f32], rng: &mut impl Rng) -> [f32; JOINTS] {
+        let mean = self.mean(state_row);
+        let noise: [f32; JOINTS] = std::array::from_fn(|_| StandardNormal.sample(rng));
+        std::array::from_fn(|i| self.action.undo(i, mean[i] + self.log_std[i].exp() * noise[i]))
+    }
+
+    fn mean(&self, state_row: &[f32]) -> Vec<f32> {
+        assert_eq!(state_row.len(), self.task.state_dim(), "the row of another task than {}", self.task);
+        let mut pass = Pass::new(&self.net, 1);
+        self.features.forward(state_row, &self.features.hand(state_row), &mut pass.input);
+        self.net.forward(&mut pass, 0..1);
+        pass.output
+    }
+
+    /// All arrays.
+    pub fn to_tensors(&self) -> Vec<NamedTensor> {
+        let mut out = Vec::new();
+        push_features(&mut out, "policy", &self.features);
+        push_scaling(&mut out, "policy.action", &self.action);
+        push_network(&mut out, "policy", &self.net);
+        out.push(vector("policy.log_std", &self.log_std));
+        out
+    }
+
+    /// All that is not an array.
+    pub fn meta(&self) -> Value {
+        let (features, mask_dq) = self.features.choice();
+        let widths = self.net.widths();
+        json!({
+            "network": "policy",
+            "task": self.task,
+            "state_dim": self.task.state_dim(),
+            "features": features,
+            "mask_dq": mask_dq,
+            "activation": self.net.activation(),
+            "hidden": &widths[1..widths.len() - 1],
+            "horizon_steps": self.horizon_steps,
+            "settings": self.settings,
+        })
+    }
+
+    /// The inverse of [`Policy::to_tensors`] and [`Policy::meta`].
+    ///
+    /// # Errors
+    /// Says what is missing or does not fit, with both numbers.
+    pub fn from_tensors(tensors: &[NamedTensor], meta: &Value) -> Result<Self, String> {
+        let reader = Reader { tensors, meta };
+        let task = reader.task("policy")?;
+        let features = reader.features("policy", task)?;
+        let net = reader.network("policy", features.width(), JOINTS)?;
+        Ok(Policy {
+            task,
+            horizon_steps: reader.meta("horizon_steps")?,
+            features,
+            action: reader.scaling("policy.action", JOINTS)?,
+            net,
+            log_std: reader.tensor("policy.log_std", &[JOINTS])?,
+            settings: reader.meta("settings")?,
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::learn::testing::demos;
+    use crate::seed::stream;
+
+    #[test]
+    fn a_policy_survives_its_tensors_and_refuses_wrong_ones() {
+        let corpus = Corpus::new(&demos(Task::Stack, 3, 20, 0), "training").expect("demos");
+        let policy = Policy::new(&corpus, &TrainSettings::default(), &mut stream(0, "test", 0));
+        assert_eq!(policy.horizon_steps(), 44);
+        let (tensors, meta) = (policy.to_tensors(), policy.meta());
+        assert_eq!(Policy::from_tensors(&tensors, &meta).as_ref(), Ok(&policy));
+
+        let refused = |tensors: &[NamedTensor], meta: &Value| Policy::from_tensors(tensors, meta).expect_err("refused");
+        let mut other = meta.clone();
+        other["state_dim"] = json!(28);
+        let message = refused(&tensors, &other);
+        assert!(message.contains("28") && message.contains("32"), "{message}");
+        let mut cut = tensors.clone();
+        cut[4].shape = vec![8];
+        assert!(refused(&cut, &meta).contains("[8]"), "{}", refused(&cut, &meta));
+        assert!(refused(&tensors[1..], &meta).contains("policy.state.mean is missing"));
+        other = meta.clone();
+        other["network"] = json!("dynamics");
+        assert!(refused(&tensors, &other).contains("dynamics"));
+    }
+
+    #[test]
+    fn samples_scatter_around_the_mean() {
+        let corpus = Corpus::new(&demos(Task::PickUp, 2, 20, 0), "training").expect("demos");
+        let policy = Policy::new(&corpus, &TrainSettings::default(), &mut stream(0, "test", 0));
+        let (row, mut rng) = (corpus.state(3), stream(1, "test", 0));
+        let mean = policy.act(row);
+        let average: f32 = (0..2000).map(|_| policy.sample(row, &mut rng)[0]).sum::<f32>() / 2000.0;
+        assert!((average - mean[0]).abs() < 0.1 * policy.action.std[0], "{average} against {}", mean[0]);
+    }
+}

@@ -1,0 +1,117 @@
+//! Algorithm 4: pretraining the dynamics network on the transitions that the demos observed.
+
+use super::corpus::{Corpus, Samples};
+use super::dynamics::Dynamics;
+use super::metrics::{EpochMetrics, Mean, table};
+use super::model_report::{ModelReport, error_table};
+use super::regression::{Loss, Regression};
+use crate::config::{ModelLoss, PretrainSettings};
+use crate::demo::Demo;
+use crate::error::{Error, Result};
+use crate::interrupt::Interrupt;
+use crate::nn::{Adam, Ema, clip_by_global_norm, cosine};
+use crate::seed::stream;
+use crate::state::BASE_DIM;
+use rand::seq::SliceRandom;
+
+/// Learns f_phi from the executed actions of `train`; `log` is called after every epoch.
+///
+/// # Errors
+/// [`Error::Usage`] for a setting out of range; [`Error::Failed`] without demos or when the loss is not a number;
+/// [`Error::Interrupted`].
+pub fn pretrain_dynamics(
+    train: &[Demo],
+    validation: &[Demo],
+    settings: &PretrainSettings,
+    seed: u64,
+    log: &mut dyn FnMut(&EpochMetrics),
+    interrupt: &Interrupt,
+) -> Result<(Dynamics, ModelReport)> {
+    settings.validate()?;
+    let (corpus, held_out) = (Corpus::new(train, "training")?, Corpus::new(validation, "validation")?);
+    let mut dynamics = Dynamics::new(&corpus, settings, &mut stream(seed, "pretrain.init", 0));
+    let (samples, held_out_samples) = (corpus.model_samples(&dynamics), held_out.model_samples(&dynamics));
+    let batches = Batches::new(&corpus, settings.batch_rows);
+    let total = settings.epochs * batches.per_epoch();
+    let mut adam = Adam::new(dynamics.net.params().len());
+    let mut ema = Ema::new(dynamics.net.params(), settings.ema_decay);
+    let (mut work, mut averaged, mut epochs, mut updates) = (Regression::default(), dynamics.clone(), Vec::new(), 0);
+    for epoch in 0..settings.epochs {
+        let mut mean = Mean::default();
+        let mut metrics = EpochMetrics::new("pretrain", epoch + 1, settings.epochs);
+        for rows in batches.shuffled(&mut stream(seed, "pretrain.order", epoch)) {
+            interrupt.check()?;
+            let loss = model_loss(&dynamics, rows.len(), corpus.rows() as f32 / corpus.demos() as f32);
+            let l_model = work.loss(&dynamics.net, &samples, &rows, &loss, true);
+            if !l_model.is_finite() {
+                let update = updates + 1;
+                return Err(Error::Failed(format!(
+                    "the loss of the dynamics network (Eq. 6) is {l_model} at update {update}; lower pretrain.learning_rate"
+                )));
+            }
+            clip_by_global_norm(&mut work.gradient, settings.clip_norm);
+            metrics.learning_rate = cosine(settings.learning_rate, settings.final_learning_rate, updates, total);
+            adam.step(dynamics.net.params_mut(), &work.gradient, metrics.learning_rate);
+            ema.update(dynamics.net.params());
+            mean.add(l_model);
+            updates += 1;
+        }
+        averaged.net.params_mut().copy_from_slice(ema.average());
+        (metrics.updates, metrics.l_model) = (updates, mean.get());
+        metrics.validation_l_model = validation_loss(&averaged, &held_out, &held_out_samples, &mut work);
+        log(&metrics);
+        epochs.push(metrics);
+    }
+    let errors = error_table(&averaged, &held_out);
+    Ok((averaged, ModelReport { errors, metrics: table(&epochs) }))
+}
+
+/// Loss on all of the validation transitions.
+pub(super) fn validation_loss(dynamics: &Dynamics, corpus: &Corpus, samples: &Samples, work: &mut Regression) -> f64 {
+    let rows: Vec<usize> = (0..corpus.rows()).collect();
+    let loss = model_loss(dynamics, rows.len(), corpus.rows() as f32 / corpus.demos() as f32);
+    work.loss(&dynamics.net, samples, &rows, &loss, false)
+}
+
+/// Eq. 6 for a batch of `rows` transitions; a demo has `mean_length` on average.
+pub(super) fn model_loss(dynamics: &Dynamics, rows: usize, mean_length: f32) -> Loss {
+    let kind = dynamics.settings().loss;
+    let huber = kind == ModelLoss::StandardisedHuber;
+    match kind {
+        ModelLoss::RawSum => {
+            let weights = dynamics.residual_scaling().std.iter().map(|s| s * s).collect();
+            Loss { weights, scale: mean_length / rows as f32, huber }
+        }
+        _ => Loss { weights: vec![1.0; BASE_DIM], scale: 1.0 / (rows * BASE_DIM) as f32, huber },
+    }
+}
+
+/// How an epoch is cut into updates.
+pub(super) struct Batches<'a> {
+    corpus: &'a Corpus,
+    /// Transitions per update; 0 = one whole demo.
+    rows: usize,
+}
+
+impl<'a> Batches<'a> {
+    pub fn new(corpus: &'a Corpus, rows: usize) -> Self {
+        Batches { corpus, rows: rows.min(corpus.rows()) }
+    }
+
+    /// Updates in an epoch; transitions that do not fill a batch wait for the next shuffle.
+    pub fn per_epoch(&self) -> u64 {
+        self.corpus.rows().checked_div(self.rows).unwrap_or(self.corpus.demos()) as u64
+    }
+
+    /// The batches of one epoch, in random order.
+    pub fn shuffled(&self, rng: &mut impl rand::Rng) -> Vec<Vec<usize>> {
+        if self.rows == 0 {
+            let mut order: Vec<usize> = (0..self.corpus.demos()).collect();
+            order.shuffle(rng);
+            return order.into_iter().map(|i| self.corpus.demo(i).collect()).collect();
+        }
+        let mut order: Vec<usize> = (0..self.corpus.rows()).collect();
+        order.shuffle(rng);
+        order.chunks_exact(self.rows).map(<[usize]>::to_vec).collect()
+    }
+}

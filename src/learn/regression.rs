@@ -1,0 +1,122 @@
+//! Supervised learning of a network by minibatches, in shards: how the dynamics network learns from observed transitions (Eq. 6).
+
+use super::corpus::{Samples, row};
+use super::shards;
+use crate::nn::{Mlp, Pass};
+use rayon::prelude::*;
+
+/// Where Huber's function turns from a parabola into a line, in standard deviations.
+const HUBER_KNEE: f32 = 1.0;
+
+/// sum over rows and entries of scale * weight_i * loss(error_i).
+#[derive(Clone, Debug)]
+pub struct Loss {
+    /// Weight of each entry.
+    pub weights: Vec<f32>,
+    /// Factor of the sum.
+    pub scale: f32,
+    /// Huber's function instead of the square.
+    pub huber: bool,
+}
+
+/// The workspace, and the gradient of the last batch.
+#[derive(Default)]
+pub struct Regression {
+    shards: Vec<Shard>,
+    /// Gradient with respect to the parameters.
+    pub gradient: Vec<f32>,
+}
+
+#[derive(Default)]
+struct Shard {
+    pass: Pass,
+    gradient: Vec<f32>,
+    loss: f64,
+}
+
+impl Regression {
+    /// Loss of the network on `rows` of `samples`; with `learn`, its gradient too.
+    pub fn loss(&mut self, net: &Mlp, samples: &Samples, rows: &[usize], loss: &Loss, learn: bool) -> f64 {
+        let active = shards::count(rows.len());
+        self.shards.resize_with(active.max(self.shards.len()), Shard::default);
+        self.shards[..active].par_iter_mut().enumerate().for_each(|(i, shard)| {
+            shard.run(net, samples, &rows[shards::range(rows.len(), active, i)], loss, learn);
+        });
+        self.gradient.resize(net.params().len(), 0.0);
+        self.gradient.fill(0.0);
+        let mut total = 0.0;
+        for shard in &self.shards[..active] {
+            total += shard.loss;
+            if learn {
+                shards::add_scaled(&mut self.gradient, &shard.gradient, 1.0);
+            }
+        }
+        total
+    }
+}
+
+impl Shard {
+    fn run(&mut self, net: &Mlp, samples: &Samples, rows: &[usize], loss: &Loss, learn: bool) {
+        let (inputs, outputs) = (net.inputs(), net.outputs());
+        self.pass.reserve(net, rows.len());
+        for (slot, r) in rows.iter().enumerate() {
+            self.pass.input[slot * inputs..(slot + 1) * inputs].copy_from_slice(row(&samples.inputs, inputs, *r));
+        }
+        net.forward(&mut self.pass, 0..rows.len());
+        self.loss = 0.0;
+        for (slot, r) in rows.iter().enumerate() {
+            let target = row(&samples.targets, outputs, *r);
+            let mut sum = 0.0f32;
+            for i in 0..outputs {
+                let error = self.pass.output[slot * outputs + i] - target[i];
+                let (value, slope) = if loss.huber && error.abs() > HUBER_KNEE {
+                    (HUBER_KNEE * (2.0 * error.abs() - HUBER_KNEE), 2.0 * HUBER_KNEE * error.signum())
+                } else {
+                    (error * error, 2.0 * error)
+                };
+                sum += loss.weights[i] * value;
+                self.pass.d_output[slot * outputs + i] = loss.scale * loss.weights[i] * slope;
+            }
+            self.loss += f64::from(loss.scale * sum);
+        }
+        if learn {
+            net.backward(&mut self.pass, 0..rows.len());
+            self.gradient.clear();
+            self.gradient.resize(net.params().len(), 0.0);
+            net.add_gradient(&self.pass, 0..rows.len(), &mut self.gradient);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::nn::Activation;
+    use crate::seed::stream;
+    use rand::RngExt;
+
+    #[test]
+    fn gradients_of_square_and_huber_equal_finite_differences() {
+        let mut rng = stream(3, "regression", 0);
+        let mut net = Mlp::new(&[3, 8, 2], Activation::Tanh, &mut rng);
+        let mut random = |n: usize, size: f32| -> Vec<f32> { (0..n).map(|_| size * (rng.random::<f32>() - 0.5)).collect() };
+        let samples = Samples { inputs: random(200 * 3, 2.0), targets: random(200 * 2, 6.0) };
+        let rows: Vec<usize> = (0..200).collect();
+        for huber in [false, true] {
+            let loss = Loss { weights: vec![1.0, 0.5], scale: 1.0 / 400.0, huber };
+            let mut work = Regression::default();
+            work.loss(&net, &samples, &rows, &loss, true);
+            let gradient = work.gradient.clone();
+            for (i, analytic) in gradient.iter().enumerate() {
+                let mut at = |h: f32| {
+                    net.params_mut()[i] += h;
+                    let value = work.loss(&net, &samples, &rows, &loss, false);
+                    net.params_mut()[i] -= h;
+                    value
+                };
+                let numeric = (at(1e-2) - at(-1e-2)) / 2e-2;
+                assert!((numeric - f64::from(*analytic)).abs() < 2e-3, "huber {huber}, {i}: {analytic} against {numeric}");
+            }
+        }
+    }
+}

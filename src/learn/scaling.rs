@@ -1,0 +1,63 @@
+//! Standardisation: (x - mean) / std, entry by entry, with statistics of the training demos only.
+
+/// Mean and standard deviation of each entry.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Scaling {
+    /// Means.
+    pub mean: Vec<f32>,
+    /// Standard deviations, at least the floor given to [`Scaling::fit`].
+    pub std: Vec<f32>,
+}
+
+impl Scaling {
+    /// Statistics of `rows` (row-major, `width` wide). A smaller spread than `floor` counts as noise and is not blown up.
+    pub fn fit(rows: &[f32], width: usize, floor: f32) -> Self {
+        if width == 0 {
+            return Scaling::default();
+        }
+        let n = (rows.len() / width).max(1) as f64;
+        let mut mean = vec![0.0f64; width];
+        for row in rows.chunks_exact(width) {
+            mean.iter_mut().zip(row).for_each(|(m, v)| *m += f64::from(*v) / n);
+        }
+        let mut variance = vec![0.0f64; width];
+        for row in rows.chunks_exact(width) {
+            let pairs = variance.iter_mut().zip(row.iter().zip(&mean));
+            pairs.for_each(|(s, (v, m))| *s += (f64::from(*v) - m).powi(2) / n);
+        }
+        Scaling {
+            mean: mean.iter().map(|m| *m as f32).collect(),
+            std: variance.iter().map(|v| (v.sqrt() as f32).max(floor)).collect(),
+        }
+    }
+
+    /// Number of entries.
+    pub fn width(&self) -> usize {
+        self.mean.len()
+    }
+
+    /// Entry `i` of a row, standardised.
+    #[inline]
+    pub fn apply(&self, i: usize, value: f32) -> f32 {
+        (value - self.mean[i]) / self.std[i]
+    }
+
+    /// The inverse of [`Scaling::apply`].
+    #[inline]
+    pub fn undo(&self, i: usize, value: f32) -> f32 {
+        self.mean[i] + self.std[i] * value
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn statistics_and_the_floor() {
+        let scaling = Scaling::fit(&[1.0, 5.0, 3.0, 5.0], 2, 0.1);
+        assert_eq!(scaling.mean, [2.0, 5.0]);
+        assert_eq!(scaling.std, [1.0, 0.1]);
+        assert_eq!(scaling.undo(0, scaling.apply(0, 7.0)), 7.0);
+    }
+}

@@ -1,0 +1,37 @@
+//! A batch is cut into shards whose number depends on its size alone, never on the threads: the sums come out the same bytes.
+
+use std::ops::Range;
+
+/// Most shards of a batch: two for each of two cores evens out the load, more would only make the matrices thinner.
+pub const MAX_SHARDS: usize = 4;
+/// Rows below which a matrix product no longer pays for a shard of its own.
+const MIN_ROWS: usize = 64;
+
+/// Number of shards of a batch.
+pub fn count(rows: usize) -> usize {
+    (rows / MIN_ROWS).clamp(1, MAX_SHARDS)
+}
+
+/// The rows of shard `i` of `count`.
+pub fn range(rows: usize, count: usize, i: usize) -> Range<usize> {
+    rows * i / count..rows * (i + 1) / count
+}
+
+/// total += factor x part.
+pub fn add_scaled(total: &mut [f32], part: &[f32], factor: f32) {
+    total.iter_mut().zip(part).for_each(|(t, p)| *t += factor * p);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn shards_cover_every_row_once() {
+        for rows in [1, 63, 128, 511, 2320] {
+            let n = count(rows);
+            let covered: Vec<usize> = (0..n).flat_map(|i| range(rows, n, i)).collect();
+            assert_eq!(covered, (0..rows).collect::<Vec<_>>());
+        }
+    }
+}

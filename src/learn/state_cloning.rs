@@ -1,0 +1,193 @@
+//! Algorithm 3: state cloning. The policy acts in the dynamics network from a demo's first state; L_SC (Eq. 5) compares the states.
+//!
+//! Recovery puts the learner back on a *known* demo state. So all coins are drawn first; each rollout then falls apart into segments
+//! that begin at demo states, and the segments of all demos advance together as rows of one matrix. Sequential depth is the longest
+//! segment. The first action of a segment is the policy's action in a demo state, which behavior cloning has already computed.
+
+use super::corpus::Corpus;
+use super::dynamics::{Dynamics, STEP_FLOOR};
+use super::policy::Policy;
+use super::rollout::Rollout;
+use super::scaling::Scaling;
+use super::shards;
+use crate::config::{ActionChoice, Objective, Pairs, StateScale, TrainSettings};
+use crate::state::{BASE_DIM, JOINTS};
+use rand::{Rng, RngExt};
+use rayon::prelude::*;
+
+/// Spread of a state entry below which L_SC counts it as constant under `sc_scale = "state"`.
+const STATE_FLOOR: f32 = 0.01;
+
+/// Steps in the dynamics network between two demo states.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Segment {
+    /// First transition, counted within the batch.
+    pub start: usize,
+    /// Number of predictions that enter the buffer B.
+    pub steps: usize,
+}
+
+/// Draws the coins of Algorithm 3 for demos of these lengths and cuts them into segments, in order.
+pub fn draw_segments(
+    lengths: impl Iterator<Item = usize>,
+    rho: f64,
+    pairs: Pairs,
+    rng: &mut impl Rng,
+    segments: &mut Vec<Segment>,
+) {
+    segments.clear();
+    let mut first = 0;
+    for length in lengths {
+        let (mut start, end) = (first, first + length);
+        for t in first..end {
+            let recovered = rng.random::<f64>() < rho;
+            if recovered || t + 1 == end {
+                // a pair stored after recovery is (s^E, s^E): it has neither loss nor gradient
+                let steps = t + 1 - start - usize::from(recovered && pairs == Pairs::AfterRecovery);
+                if steps > 0 {
+                    segments.push(Segment { start, steps });
+                }
+                start = t + 1;
+            }
+        }
+        first = end;
+    }
+}
+
+/// What does not change from update to update.
+pub struct Choices {
+    /// Weight of each state entry's squared error.
+    pub weights: [f32; BASE_DIM],
+    /// Whether L_SC is a sum over a demo instead of a mean.
+    objective: Objective,
+    /// Which pairs enter B.
+    pub pairs: Pairs,
+    /// rho.
+    pub rho: f64,
+    /// Whether actions are sampled.
+    pub action: ActionChoice,
+}
+
+impl Choices {
+    /// From the settings and the training demos.
+    pub fn new(settings: &TrainSettings, corpus: &Corpus) -> Self {
+        let dim = corpus.task.state_dim();
+        let std = match (settings.loss, settings.sc_scale) {
+            (Objective::RawSum, _) => vec![1.0; BASE_DIM],
+            (_, StateScale::State) => Scaling::fit(&corpus.states, dim, STATE_FLOOR).std,
+            (_, StateScale::Step) => {
+                let rows = corpus.next.chunks_exact(BASE_DIM).zip(corpus.states.chunks_exact(dim));
+                let changes: Vec<f32> = rows.flat_map(|(next, s)| next.iter().zip(s).map(|(n, s)| n - s)).collect();
+                Scaling::fit(&changes, BASE_DIM, STEP_FLOOR).std
+            }
+        };
+        Choices {
+            weights: std::array::from_fn(|i| 1.0 / (std[i] * std[i])),
+            objective: settings.loss,
+            pairs: settings.sc_pairs,
+            rho: settings.rho,
+            action: settings.action,
+        }
+    }
+
+    /// Factor of every squared error: L_SC is a mean over entries and transitions, or a sum over each of the demos.
+    pub fn scale(&self, rows: usize, demos: usize) -> f32 {
+        match self.objective {
+            Objective::RawSum => 1.0 / demos as f32,
+            Objective::StandardisedMean => 1.0 / (rows * BASE_DIM) as f32,
+        }
+    }
+}
+
+/// The demos of one update.
+#[derive(Clone, Copy)]
+pub struct Batch<'a> {
+    /// The training demos.
+    pub corpus: &'a Corpus,
+    /// The dynamics network's inputs in the demos' own states (the action is overwritten).
+    pub model_inputs: &'a [f32],
+    /// Transitions of the corpus, demo by demo.
+    pub rows: &'a [usize],
+    /// Number of demos.
+    pub demos: usize,
+    /// The policy's mean actions in those states, standardised, rows x 9.
+    pub mean: &'a [f32],
+    /// Standard normal numbers, rows x 9; empty when the mean is taken.
+    pub noise: &'a [f32],
+}
+
+/// The workspace: one rollout a shard.
+#[derive(Default)]
+pub struct Workspace {
+    rollouts: Vec<Rollout>,
+    sorted: Vec<Segment>,
+    active: usize,
+    /// Gradient of L_SC with respect to the mean actions in the demos' states, rows x 9.
+    pub d_first: Vec<f32>,
+    /// Gradient of L_SC with respect to the policy's parameters through all later steps.
+    pub gradient: Vec<f32>,
+    /// Gradient of L_SC with respect to the log standard deviations.
+    pub d_log_std: [f32; JOINTS],
+}
+
+/// Algorithm 3 over a batch: L_SC, with its gradient in `work`. The dynamics network is only passed through, never learned here.
+pub fn state_cloning(
+    policy: &Policy,
+    dynamics: &Dynamics,
+    batch: Batch,
+    segments: &[Segment],
+    choices: &Choices,
+    work: &mut Workspace,
+) -> f64 {
+    work.sorted.clear();
+    work.sorted.extend_from_slice(segments);
+    work.sorted.sort_unstable_by_key(|s| (std::cmp::Reverse(s.steps), s.start));
+    work.active = shards::count(batch.rows.len());
+    work.rollouts.resize_with(work.active.max(work.rollouts.len()), Rollout::default);
+    let (active, sorted) = (work.active, &work.sorted);
+    work.rollouts[..active].par_iter_mut().enumerate().for_each(|(i, rollout)| {
+        rollout.deal(sorted.iter().skip(i).step_by(active));
+        rollout.run(policy, dynamics, batch, choices);
+    });
+    work.collect(policy.net.params().len(), batch.rows.len())
+}
+
+impl Workspace {
+    fn collect(&mut self, params: usize, rows: usize) -> f64 {
+        self.gradient.resize(params, 0.0);
+        self.gradient.fill(0.0);
+        self.d_first.clear();
+        self.d_first.resize(rows * JOINTS, 0.0);
+        self.d_log_std = [0.0; JOINTS];
+        let mut l_sc = 0.0;
+        for rollout in &self.rollouts[..self.active] {
+            l_sc += rollout.loss;
+            shards::add_scaled(&mut self.gradient, &rollout.gradient, 1.0);
+            shards::add_scaled(&mut self.d_log_std, &rollout.d_log_std, 1.0);
+            rollout.scatter_first(&mut self.d_first);
+        }
+        l_sc
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::seed::stream;
+
+    fn segments(rho: f64, pairs: Pairs) -> Vec<Segment> {
+        let mut out = Vec::new();
+        draw_segments([50, 3].into_iter(), rho, pairs, &mut stream(0, "coins", 0), &mut out);
+        out
+    }
+
+    #[test]
+    fn segments_cover_the_demos() {
+        assert_eq!(segments(0.0, Pairs::AfterRecovery), [Segment { start: 0, steps: 50 }, Segment { start: 50, steps: 3 }]);
+        assert_eq!(segments(1.0, Pairs::BeforeRecovery).len(), 53);
+        assert!(segments(1.0, Pairs::AfterRecovery).is_empty());
+        let before = segments(0.4, Pairs::BeforeRecovery);
+        assert_eq!(before.iter().map(|s| s.steps).sum::<usize>(), 53);
+        assert!(before.iter().all(|s| s.start >= 50 || s.start + s.steps <= 50), "a segment crosses two demos");
+    }
+}

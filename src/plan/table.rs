@@ -1,0 +1,106 @@
+//! Plans as a table and back.
+
+use super::{Plan, Waypoint};
+use crate::demo::Phase;
+use crate::scene::Scene;
+use crate::state::{JOINT_NAMES, JOINTS};
+use crate::table::{Table, Values};
+
+/// Plans as a table, one row per waypoint: `episode`, `step`, `phase`, `<joint>.q_rad` and `<joint>.dq_rad_s` per joint, and `scene`, the scene
+/// as JSON on the first row of each episode (empty text on the others).
+pub fn to_table(plans: &[Plan]) -> Table {
+    let rows = || plans.iter().flat_map(|p| p.waypoints.iter().enumerate().map(move |(step, w)| (p, step, w)));
+    let scene = |p: &Plan, step: usize| match step {
+        0 => serde_json::to_string(&p.scene).expect("a scene is plain data with text keys"),
+        _ => String::new(),
+    };
+    let mut table = Table::default()
+        .with("episode", "Episode number.", Values::I64(rows().map(|(p, ..)| p.index as i64).collect()))
+        .with("step", "Control step within the episode, from 0.", Values::I64(rows().map(|(_, step, _)| step as i64).collect()))
+        .with("phase", "Part of the plan.", Values::Text(rows().map(|(.., w)| w.phase.name().into()).collect()));
+    for (j, name) in JOINT_NAMES.iter().enumerate() {
+        table = table.with(&format!("{name}.q_rad"), "Joint angle.", Values::F64(rows().map(|(.., w)| w.q_rad[j]).collect()));
+    }
+    for (j, name) in JOINT_NAMES.iter().enumerate() {
+        let velocity = rows().map(|(.., w)| w.dq_rad_s[j]).collect();
+        table = table.with(&format!("{name}.dq_rad_s"), "Joint velocity that leads to the next step.", Values::F64(velocity));
+    }
+    table.with(
+        "scene",
+        "The scene as JSON on the first row of each episode, empty on the others.",
+        Values::Text(rows().map(|(p, step, _)| scene(p, step)).collect()),
+    )
+}
+
+/// The inverse of [`to_table`].
+///
+/// # Errors
+/// Says which column is missing or of another type, and in which row a number is not finite, a phase unknown, a scene unreadable, or the
+/// order of episodes, steps or phases broken.
+pub fn from_table(table: &Table) -> Result<Vec<Plan>, String> {
+    let (episodes, steps) = (integers(table, "episode")?, integers(table, "step")?);
+    let (phases, scenes) = (texts(table, "phase")?, texts(table, "scene")?);
+    let joints =
+        |suffix: &str| JOINT_NAMES.iter().map(|j| floats(table, &format!("{j}.{suffix}"))).collect::<Result<Vec<_>, _>>();
+    let (q, dq) = (joints("q_rad")?, joints("dq_rad_s")?);
+    let rows = episodes.len();
+    if let Some(c) = table.columns.iter().find(|c| c.values.len() != rows) {
+        return Err(format!("column {} has {} rows, episode has {rows}", c.name, c.values.len()));
+    }
+    let mut plans: Vec<Plan> = Vec::new();
+    for row in 0..rows {
+        let at = |what: String| format!("row {row}: {what}");
+        let number = |columns: &[&[f64]]| -> Result<[f64; JOINTS], String> {
+            let values: [f64; JOINTS] = std::array::from_fn(|j| columns[j][row]);
+            match values.iter().position(|v| !v.is_finite()) {
+                Some(j) => Err(at(format!("{} is {}, not a finite number", JOINT_NAMES[j], values[j]))),
+                None => Ok(values),
+            }
+        };
+        let phase = Phase::ALL.into_iter().find(|p| p.name() == phases[row]).ok_or_else(|| {
+            at(format!("unknown phase \"{}\"; allowed: {}", phases[row], Phase::ALL.map(Phase::name).join(", ")))
+        })?;
+        let waypoint = Waypoint { phase, q_rad: number(&q)?, dq_rad_s: number(&dq)? };
+        let index = u64::try_from(episodes[row]).map_err(|_| at(format!("episode {} is negative", episodes[row])))?;
+        if steps[row] == 0 {
+            if plans.iter().any(|p| p.index == index) {
+                return Err(at(format!("episode {index} begins a second time")));
+            }
+            let scene: Scene = serde_json::from_str(&scenes[row]).map_err(|e| at(format!("the scene cannot be read: {e}")))?;
+            plans.push(Plan { index, scene, waypoints: vec![waypoint] });
+            continue;
+        }
+        let plan = plans.last_mut().filter(|p| p.index == index && p.waypoints.len() as i64 == steps[row]);
+        let plan = plan.ok_or_else(|| at(format!("episode {index} step {} does not follow the row before", steps[row])))?;
+        if plan.waypoints[plan.waypoints.len() - 1].phase > phase {
+            return Err(at(format!("phase {} comes after a later one", phase.name())));
+        }
+        plan.waypoints.push(waypoint);
+    }
+    Ok(plans)
+}
+
+fn values<'a>(table: &'a Table, name: &str) -> Result<&'a Values, String> {
+    Ok(&table.column(name).ok_or_else(|| format!("column {name} is missing: this is no table of plans"))?.values)
+}
+
+fn integers<'a>(table: &'a Table, name: &str) -> Result<&'a [i64], String> {
+    match values(table, name)? {
+        Values::I64(v) => Ok(v),
+        _ => Err(format!("column {name} must hold 64-bit integers")),
+    }
+}
+
+fn floats<'a>(table: &'a Table, name: &str) -> Result<&'a [f64], String> {
+    match values(table, name)? {
+        Values::F64(v) => Ok(v),
+        _ => Err(format!("column {name} must hold 64-bit floats")),
+    }
+}
+
+fn texts<'a>(table: &'a Table, name: &str) -> Result<&'a [String], String> {
+    match values(table, name)? {
+        Values::Text(v) => Ok(v),
+        _ => Err(format!("column {name} must hold text")),
+    }
+}

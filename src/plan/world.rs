@@ -1,0 +1,163 @@
+//! What a plan must keep clear of: table, obstacles, base block, the block itself, and the arm's own base.
+
+use super::collision::{Solid, place_links};
+use crate::robot::jaco::{HAND_LINK, LINK_NAMES, LINK_SHAPES};
+use crate::robot::kinematics::tool_of;
+use crate::robot::{Arm, LinkPoses};
+use crate::scene::{BLOCK_EDGE_M, Scene};
+use crate::state::{Context, JOINTS};
+use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
+
+/// Least distance of arm and carried block to anything fixed, in a finished plan \[m\].
+pub const CLEARANCE_M: f64 = 0.01;
+/// The same while a path is searched \[m\]: what smoothing may take away comes on top.
+pub(super) const SEARCH_CLEARANCE_M: f64 = 0.02;
+/// Least height of hand and fingers above the table \[m\]: closed fingers reach 19 mm below the tool point.
+const HAND_TABLE_M: f64 = 0.002;
+/// Least distance of the open hand to the block \[m\]: the fingers straddle it.
+const HAND_BLOCK_M: f64 = 0.003;
+/// Least distance between the arm's own links \[m\].
+const SELF_M: f64 = 0.005;
+/// The carried block may sink this far into its support \[m\]: it begins in contact, and the numbers are rounded.
+const SUPPORT_SLACK_M: f64 = 1e-3;
+/// The support of the block may be touched within this distance of grasp and release, sideways \[m\] ...
+const SUPPORT_ZONE_XY_M: f64 = 0.015;
+/// ... and upward \[m\].
+const SUPPORT_ZONE_Z_M: f64 = 0.05;
+/// The greatest distance between two configurations that are checked \[m\].
+pub const RESOLUTION_M: f64 = 0.01;
+
+/// Where the block is while a piece of the plan is executed.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Block {
+    /// It stands free in this pose; the open hand must not push it.
+    Free(Isometry3<f64>),
+    /// The hand holds it, in this pose relative to the tool.
+    Held(Isometry3<f64>),
+}
+
+/// The fixed things of a scene.
+#[derive(Clone, Debug)]
+pub(super) struct World {
+    arm: Arm,
+    obstacles: Vec<Solid>,
+    base_block: Option<Solid>,
+    /// Where the block's centre is released \[m\].
+    release_m: Vector3<f64>,
+}
+
+impl World {
+    /// From a scene.
+    pub(super) fn new(scene: &Scene) -> Self {
+        let half = |size: [f64; 3]| size.map(|s| s / 2.0);
+        let obstacles = scene
+            .obstacles
+            .iter()
+            .map(|o| {
+                Solid::cuboid(Isometry3::from_parts(Translation3::from(o.center_m), UnitQuaternion::identity()), half(o.size_m))
+            })
+            .collect();
+        let base_block = match scene.context {
+            Context::Base(base) => Some(Solid::cuboid(base.isometry(), [BLOCK_EDGE_M / 2.0; 3])),
+            _ => None,
+        };
+        World { arm: Arm::new(), obstacles, base_block, release_m: scene.target_m().into() }
+    }
+
+    /// Whether anything stands there that a straight way could meet.
+    pub(super) fn has_obstacles(&self) -> bool {
+        !self.obstacles.is_empty()
+    }
+
+    /// Whether the arm at `q` keeps `margin_m` from everything fixed.
+    ///
+    /// # Errors
+    /// Names what comes too near to what.
+    pub(super) fn check(&self, q: &[f64; JOINTS], block: &Block, margin_m: f64) -> Result<(), String> {
+        self.check_poses(&self.arm.link_poses(q), block, margin_m)
+    }
+
+    /// The same along the straight joint path between two configurations, at [`RESOLUTION_M`]; the first one is not checked.
+    pub(super) fn check_motion(
+        &self,
+        from: &[f64; JOINTS],
+        to: &[f64; JOINTS],
+        block: &Block,
+        margin_m: f64,
+    ) -> Result<(), String> {
+        let end = self.arm.link_poses(to);
+        let steps = (travel_m(&self.arm.link_poses(from), &end) / RESOLUTION_M).ceil().max(1.0) as usize;
+        for k in 1..steps {
+            let t = k as f64 / steps as f64;
+            let q = std::array::from_fn(|i| from[i] + t * (to[i] - from[i]));
+            self.check(&q, block, margin_m)?;
+        }
+        self.check_poses(&end, block, margin_m)
+    }
+
+    fn check_poses(&self, poses: &LinkPoses, block: &Block, margin_m: f64) -> Result<(), String> {
+        let links = place_links(poses);
+        let tool = tool_of(poses);
+        let at_release = self.at_release(&tool);
+        for (solid, spec) in links.iter().zip(&LINK_SHAPES) {
+            let name = LINK_NAMES[spec.link];
+            let (hand, finger) = (spec.link >= HAND_LINK, spec.link > HAND_LINK);
+            let table = if hand { HAND_TABLE_M } else { margin_m };
+            if spec.link > 0 && solid.lowest_m() < table {
+                return Err(format!("{name} comes within {:.0} mm of the table", table * 1e3));
+            }
+            let base_margin = if finger && at_release { HAND_TABLE_M } else { margin_m };
+            self.check_fixed(solid, name, margin_m, base_margin)?;
+            if let (true, Block::Free(pose)) = (hand, block)
+                && !solid.farther_than(&Solid::cuboid(*pose, [BLOCK_EDGE_M / 2.0; 3]), HAND_BLOCK_M)
+            {
+                return Err(format!("{name} would push the block"));
+            }
+        }
+        if let Block::Held(in_tool) = block {
+            let carried = Solid::cuboid(tool * in_tool, [BLOCK_EDGE_M / 2.0; 3]);
+            if carried.lowest_m() < -SUPPORT_SLACK_M {
+                return Err("the carried block is pressed into the table".into());
+            }
+            let base_margin = if at_release { -SUPPORT_SLACK_M } else { margin_m };
+            self.check_fixed(&carried, "the carried block", margin_m, base_margin)?;
+        }
+        check_self(&links)
+    }
+
+    fn check_fixed(&self, solid: &Solid, name: &str, margin_m: f64, base_margin_m: f64) -> Result<(), String> {
+        if let Some(i) = self.obstacles.iter().position(|o| !solid.farther_than(o, margin_m)) {
+            return Err(format!("{name} comes within {:.0} mm of obstacle {i}", margin_m * 1e3));
+        }
+        match &self.base_block {
+            Some(base) if !solid.farther_than(base, base_margin_m) => Err(format!("{name} comes too near to the base block")),
+            _ => Ok(()),
+        }
+    }
+
+    fn at_release(&self, tool: &Isometry3<f64>) -> bool {
+        let away = tool.translation.vector - self.release_m;
+        away.xy().norm() < SUPPORT_ZONE_XY_M && away.z < SUPPORT_ZONE_Z_M
+    }
+}
+
+/// Coarse: wrist, hand and fingers against base, shoulder and upper arm.
+fn check_self(links: &[Solid]) -> Result<(), String> {
+    let with =
+        |range: std::ops::RangeInclusive<usize>| LINK_SHAPES.iter().zip(links).filter(move |(s, _)| range.contains(&s.link));
+    for (outer, a) in with(4..=9) {
+        for (inner, b) in with(0..=2) {
+            if !a.farther_than(b, SELF_M) {
+                return Err(format!("{} comes too near to {}", LINK_NAMES[outer.link], LINK_NAMES[inner.link]));
+            }
+        }
+    }
+    Ok(())
+}
+
+/// The farthest that elbow, wrist, hand or fingertip move between two configurations \[m\].
+fn travel_m(a: &LinkPoses, b: &LinkPoses) -> f64 {
+    let origins = a.iter().zip(b).map(|(a, b)| (a.translation.vector - b.translation.vector).norm());
+    let tip = (tool_of(a).translation.vector - tool_of(b).translation.vector).norm();
+    origins.fold(tip, f64::max)
+}

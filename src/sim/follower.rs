@@ -1,0 +1,208 @@
+//! The demonstrator: follows a plan by where the arm *is*, not by the clock.
+//!
+//! The reference is the point of the plan that the present state has reached; fingers close, lift and open on conditions of the
+//! state. So the action is (up to noise) a function of the state, and a policy without memory can imitate it.
+
+use super::Controller;
+use crate::demo::Phase;
+use crate::plan::Plan;
+use crate::robot::jaco::{POSITION_LIMITS_RAD, PRESHAPE_RAD, VELOCITY_LIMITS_RAD_S};
+use crate::robot::kinematics::Arm;
+use crate::state::{ARM_JOINTS, Action, CONTROL_DT_S, JOINTS};
+use crate::tasks::Observation;
+use nalgebra::{Matrix6, Vector3, Vector6};
+
+/// The arm steers towards the plan's point this many samples ahead of the one reached (0.3 s): the feedback gain is 1 / 0.3 s.
+const LOOK_AHEAD: usize = 6;
+/// Feedback gain on positions \[1/s\].
+const GAIN_PER_S: f64 = 1.0 / (LOOK_AHEAD as f64 * CONTROL_DT_S);
+/// Samples that the reached point may advance in one step.
+const MAX_ADVANCE: usize = 4;
+/// Samples that the reached point may fall back in one step.
+const MAX_RETREAT: usize = 12;
+/// Funnel: lateral error beyond this sets the reached point back \[m\] ...
+const FUNNEL_FREE_M: f64 = 0.005;
+/// ... by this length of path per length of error ...
+const FUNNEL_SLOPE: f64 = 3.0;
+/// ... within this distance before the segment's end \[m\].
+const FUNNEL_LENGTH_M: f64 = 0.10;
+/// Fingers close when the tool is this near to the grasp horizontally \[m\] ...
+const CLOSE_XY_M: f64 = 0.006;
+/// ... and this little above it \[m\].
+const CLOSE_Z_M: f64 = 0.004;
+/// Fingers open when the block is this near to its target horizontally \[m\] ...
+const OPEN_XY_M: f64 = 0.008;
+/// ... and this little above it \[m\].
+const OPEN_Z_M: f64 = 0.004;
+/// Finger speed while closing, holding and opening \[rad/s\].
+const FINGER_RAD_S: f64 = 0.8;
+/// The grip is firm when the fingers move slower than this \[rad/s\].
+const STALLED_RAD_S: f64 = 0.15;
+/// The hand is open when every finger is below this angle \[rad\].
+const OPENED_RAD: f64 = PRESHAPE_RAD + 0.02;
+/// Damping of the Jacobian's inverse \[m/rad\]: bounds joint speeds near singular poses.
+const DAMPING: f64 = 0.02;
+
+/// The samples of one phase with the tool's path.
+#[derive(Clone, Debug)]
+struct Segment {
+    q: Vec<[f64; JOINTS]>,
+    tool_m: Vec<Vector3<f64>>,
+    /// Path length from the segment's start \[m\].
+    arc_m: Vec<f64>,
+}
+
+impl Segment {
+    fn new(plan: &Plan, phase: Phase, arm: &Arm) -> Option<Self> {
+        let q: Vec<_> = plan.waypoints.iter().filter(|w| w.phase == phase).map(|w| w.q_rad).collect();
+        let tool_m: Vec<Vector3<f64>> = q.iter().map(|q| arm.tool_pose(q).translation.vector).collect();
+        let mut arc_m = Vec::with_capacity(q.len());
+        for (i, p) in tool_m.iter().enumerate() {
+            arc_m.push(if i == 0 { 0.0 } else { arc_m[i - 1] + (p - tool_m[i - 1]).norm() });
+        }
+        (!q.is_empty()).then_some(Segment { q, tool_m, arc_m })
+    }
+
+    fn last(&self) -> usize {
+        self.q.len() - 1
+    }
+
+    /// The sample nearest to `tool_m` within reach of the last one.
+    fn project(&self, tool_m: &Vector3<f64>, reached: usize) -> usize {
+        let range = reached.saturating_sub(MAX_RETREAT)..=(reached + MAX_ADVANCE).min(self.last());
+        let distance = |i: usize| (self.tool_m[i] - tool_m).norm_squared();
+        range.min_by(|a, b| distance(*a).total_cmp(&distance(*b))).unwrap_or(reached)
+    }
+
+    /// Sets the sample back by the funnel: the nearer the end, the straighter the way there must be.
+    fn funnel(&self, reached: usize, tool_m: &Vector3<f64>) -> usize {
+        let left = self.arc_m[self.last()] - self.arc_m[reached];
+        let lateral = (self.tool_m[reached] - tool_m).xy().norm();
+        let back = (FUNNEL_SLOPE * (lateral - FUNNEL_FREE_M).max(0.0)).min((FUNNEL_LENGTH_M - left).max(0.0));
+        let arc = self.arc_m[reached] - back;
+        self.arc_m.partition_point(|a| *a < arc).min(reached)
+    }
+}
+
+/// Follows one plan.
+#[derive(Clone, Debug)]
+pub struct Follower {
+    arm: Arm,
+    approach: Segment,
+    carry: Segment,
+    retreat: Option<Segment>,
+    /// Block centre minus tool point at the planned grasp \[m\].
+    block_from_tool_m: Vector3<f64>,
+    /// Where the block's centre must be to let go \[m\]; `None` when the task holds it.
+    release_m: Option<Vector3<f64>>,
+    phase: Phase,
+    reached: usize,
+}
+
+impl Follower {
+    /// A follower at the start of `plan`; `None` if the plan lacks a phase that its task needs.
+    pub fn new(plan: &Plan) -> Option<Self> {
+        let arm = Arm::new();
+        let approach = Segment::new(plan, Phase::Approach, &arm)?;
+        let carry = Segment::new(plan, Phase::Carry, &arm)?;
+        let retreat = Segment::new(plan, Phase::Retreat, &arm);
+        let block_from_tool_m = Vector3::from(plan.scene.block.position_m) - carry.tool_m[0];
+        let release_m = retreat.is_some().then(|| Vector3::from(plan.scene.target_m()));
+        Some(Follower { arm, approach, carry, retreat, block_from_tool_m, release_m, phase: Phase::Approach, reached: 0 })
+    }
+
+    fn enter(&mut self, phase: Phase) {
+        self.phase = phase;
+        self.reached = 0;
+    }
+
+    /// Moves on to the next phase when the state says so.
+    fn switch(&mut self, seen: &Observation) {
+        let tool = Vector3::from(seen.tool_m);
+        let fingers = |of: &[f64; JOINTS]| [of[6], of[7], of[8]];
+        match self.phase {
+            Phase::Approach => {
+                let off = tool - self.approach.tool_m[self.approach.last()];
+                if off.xy().norm() < CLOSE_XY_M && off.z < CLOSE_Z_M {
+                    self.enter(Phase::Close);
+                }
+            }
+            Phase::Close => {
+                if seen.gripped() && fingers(&seen.state.dq_rad_s).iter().all(|v| v.abs() < STALLED_RAD_S) {
+                    self.enter(Phase::Carry);
+                }
+            }
+            Phase::Carry => {
+                let block = Vector3::from(seen.state.block.position_m);
+                if self.release_m.is_some_and(|to| (block - to).xy().norm() < OPEN_XY_M && block.z - to.z < OPEN_Z_M) {
+                    self.enter(Phase::Open);
+                }
+            }
+            Phase::Open => {
+                if fingers(&seen.state.q_rad).iter().all(|q| *q < OPENED_RAD) {
+                    self.enter(Phase::Retreat);
+                }
+            }
+            Phase::Retreat => {}
+        }
+    }
+
+    /// Arm command towards the plan, the tool's target shifted by `shift_m`.
+    fn steer(&self, segment: &Segment, from: usize, q: &[f64; JOINTS], shift_m: &Vector3<f64>) -> [f64; ARM_JOINTS] {
+        let ahead = &segment.q[(from + LOOK_AHEAD).min(segment.last())];
+        let (_, jacobian) = self.arm.tool_jacobian(q);
+        let shift = Vector6::new(shift_m.x, shift_m.y, shift_m.z, 0.0, 0.0, 0.0);
+        let damped = jacobian * jacobian.transpose() + Matrix6::identity() * (DAMPING * DAMPING);
+        let joints = damped.cholesky().map_or(Vector6::zeros(), |c| jacobian.transpose() * c.solve(&shift));
+        std::array::from_fn(|i| GAIN_PER_S * (ahead[i] - q[i] + joints[i]))
+    }
+}
+
+impl Controller for Follower {
+    fn command(&mut self, seen: &Observation) -> Action {
+        self.switch(seen);
+        let q = &seen.state.q_rad;
+        let tool = Vector3::from(seen.tool_m);
+        let still = Vector3::zeros();
+        let arm = match self.phase {
+            Phase::Approach => {
+                self.reached = self.approach.project(&tool, self.reached);
+                let from = self.approach.funnel(self.reached, &tool);
+                self.steer(&self.approach, from, q, &still)
+            }
+            Phase::Close => self.steer(&self.approach, self.approach.last(), q, &still),
+            Phase::Carry => {
+                // Steer the block, not the hand: the grasp is never exactly where it was planned.
+                let virtual_tool = Vector3::from(seen.state.block.position_m) - self.block_from_tool_m;
+                self.reached = self.carry.project(&virtual_tool, self.reached);
+                let from = if self.release_m.is_some() { self.carry.funnel(self.reached, &virtual_tool) } else { self.reached };
+                self.steer(&self.carry, from, q, &(tool - virtual_tool))
+            }
+            Phase::Open => [0.0; ARM_JOINTS],
+            Phase::Retreat => match &self.retreat {
+                Some(retreat) => {
+                    self.reached = retreat.project(&tool, self.reached);
+                    self.steer(retreat, self.reached, q, &still)
+                }
+                None => [0.0; ARM_JOINTS],
+            },
+        };
+        let finger = |angle: f64| match self.phase {
+            Phase::Approach | Phase::Retreat => GAIN_PER_S * (PRESHAPE_RAD - angle),
+            Phase::Close | Phase::Carry => FINGER_RAD_S,
+            Phase::Open => -FINGER_RAD_S,
+        };
+        std::array::from_fn(|i| {
+            let command = if i < ARM_JOINTS { arm[i] } else { finger(q[i]) };
+            let [low, high] = POSITION_LIMITS_RAD[i];
+            // Never ask for more than the joint has left in this step.
+            let (slowest, fastest) = ((low - q[i]) / CONTROL_DT_S, (high - q[i]) / CONTROL_DT_S);
+            let limit = VELOCITY_LIMITS_RAD_S[i];
+            command.clamp(-limit, limit).clamp(slowest.min(0.0), fastest.max(0.0))
+        })
+    }
+
+    fn phase(&self) -> Option<Phase> {
+        Some(self.phase)
+    }
+}
