@@ -80,6 +80,12 @@ pub struct Progress<'a> {
 }
 
 impl Progress<'_> {
+    /// The work began earlier, at `started`.
+    pub fn since(mut self, started: Instant) -> Self {
+        self.started = started;
+        self
+    }
+
     /// One more item is done.
     pub fn step(&self) {
         self.step_with("");

@@ -2,24 +2,27 @@
 
 use super::{Console, Progress};
 use crate::learn::EpochMetrics;
+use std::time::Instant;
 
 /// Follows the epochs of one stage.
 pub struct Epochs<'a> {
     console: &'a Console,
     running: Option<(&'static str, Progress<'a>)>,
+    /// When the running part began: its first report comes after its first epoch.
+    began: Instant,
 }
 
 impl<'a> Epochs<'a> {
     /// Before the first epoch.
     pub fn new(console: &'a Console) -> Self {
-        Epochs { console, running: None }
+        Epochs { console, running: None, began: Instant::now() }
     }
 
     /// One more epoch is done.
     pub fn step(&mut self, epoch: &EpochMetrics) {
         if self.running.as_ref().is_none_or(|(part, _)| *part != epoch.stage) {
             self.finish();
-            self.running = Some((epoch.stage, self.console.progress(epoch.stage, epoch.epochs, "epochs")));
+            self.running = Some((epoch.stage, self.console.progress(epoch.stage, epoch.epochs, "epochs").since(self.began)));
         }
         if let Some((_, progress)) = &self.running {
             progress.step_with(&words(epoch));
@@ -30,6 +33,7 @@ impl<'a> Epochs<'a> {
     pub fn finish(&mut self) {
         if let Some((_, progress)) = self.running.take() {
             progress.finish("");
+            self.began = Instant::now();
         }
     }
 }

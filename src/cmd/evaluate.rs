@@ -52,7 +52,8 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome> {
     };
     let summary = Summary::of(pipeline.task, &trials);
     if let Some(out) = &args.out {
-        let provenance = args.settings.provenance(Stage::Evaluate, &pipeline, &inputs)?;
+        let mut provenance = args.settings.provenance(Stage::Evaluate, &pipeline, &inputs)?;
+        provenance.settings["policy"] = if by_planner { PLANNER } else { train::KIND }.into();
         let value = serde_json::to_value(&summary).map_err(|e| Error::Failed(format!("cannot write JSON: {e}")))?;
         table_file::write(&out.with_extension("parquet"), &to_table(pipeline.task, &trials), &provenance)?;
         json_file::write(out, &value, &provenance)?;

@@ -21,6 +21,7 @@ use crate::error::{Error, Result};
 use crate::interrupt::Interrupt;
 use clap::{Parser, Subcommand};
 use std::path::PathBuf;
+use std::time::Instant;
 
 /// How a stage that did not fail ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -96,17 +97,20 @@ impl Cli {
             .build_global()
             .map_err(|e| Error::Failed(format!("cannot start worker threads: {e}; try --threads 1")))?;
         let context = Context { console: Console::new(self.quiet, self.log.as_deref())?, interrupt };
-        match &self.command {
+        let started = Instant::now();
+        let outcome = match &self.command {
             Command::Plan(args) => plan::run(args, &context),
             Command::Simulate(args) => simulate::run(args, &context),
             Command::Convert(args) => convert::run(args, &context),
             Command::Pretrain(args) => pretrain::run(args, &context),
             Command::Train(args) => train::run(args, &context),
             Command::Evaluate(args) => evaluate::run(args, &context),
-            Command::Inspect(args) => inspect::run(args),
+            Command::Inspect(args) => return inspect::run(args),
             Command::Render(args) => render::run(args, &context),
-            Command::Settings(args) => settings::run(args),
-        }
+            Command::Settings(args) => return settings::run(args),
+        };
+        context.console.say(&format!("wall time {:.1} s", started.elapsed().as_secs_f64()));
+        outcome
     }
 }
 

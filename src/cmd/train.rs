@@ -20,10 +20,10 @@ pub struct Args {
     #[arg(long, value_name = "METHOD", default_value = "hil", value_parser = method)]
     method: Method,
     /// State recovery probability, 0 to 1 [default: train.rho]
-    #[arg(long, value_name = "RHO")]
+    #[arg(long, value_name = "RHO", allow_negative_numbers = true)]
     rho: Option<f64>,
     /// Weight of state cloning: adaptive, or 0 to 1 [default: train.alpha]
-    #[arg(long, value_name = "ALPHA")]
+    #[arg(long, value_name = "ALPHA", allow_negative_numbers = true)]
     alpha: Option<String>,
     /// Directory with the datasets train and validation [default: runs/<TASK>/dataset]
     #[arg(long, value_name = "DIR")]
@@ -50,7 +50,8 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome> {
     let needs_model = args.method != Method::Bc || args.dynamics.is_some();
     let dynamics = needs_model.then(|| read_dynamics(&model, pipeline.task)).transpose()?;
     let inputs: &[&Path] = if needs_model { &[&dir, &model] } else { &[&dir] };
-    let provenance = args.settings.provenance(Stage::Train, &pipeline, inputs)?;
+    let mut provenance = args.settings.provenance(Stage::Train, &pipeline, inputs)?;
+    provenance.settings["method"] = format!("{:?}", args.method).to_lowercase().into();
 
     let mut epochs = Epochs::new(&context.console);
     let seed = args.settings.seed;
