@@ -28,10 +28,12 @@ pub struct EvaluateSettings {
     pub horizon_steps: u32,
     /// Whether actions are sampled from the policy's Gaussian instead of its mean.
     pub stochastic: bool,
+    /// Whether the pulses of `[simulate.pulses]` disturb evaluation episodes too; the noise always does.
+    pub pulses: bool,
 }
 
 impl Default for EvaluateSettings {
     fn default() -> Self {
-        EvaluateSettings { episodes: 500, horizon_steps: 0, stochastic: false }
+        EvaluateSettings { episodes: 500, horizon_steps: 0, stochastic: false, pulses: false }
     }
 }

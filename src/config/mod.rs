@@ -1,18 +1,24 @@
 //! Settings: one struct per stage, doc, default and unit beside each field; frozen after parsing.
 //! Precedence: defaults < pipeline file < `--set stage.key=value` < flags.
 
+mod check;
 mod choices;
 mod data;
 mod learn;
+mod load;
+mod ranges;
 mod scene;
 
 pub use choices::{ActionChoice, Alpha, Convergence, FeatureSet, ModelLoss, Objective, Pairs, StateScale, Structure};
 pub use data::{ConvertSettings, EvaluateSettings};
 pub use learn::{PretrainSettings, TrainSettings};
+pub use load::{Preset, Source};
 pub use scene::{PlanSettings, PulseSettings, SceneSettings, SimulateSettings};
 
+use crate::error::{Error, Result};
 use crate::tasks::Task;
 use serde::{Deserialize, Serialize};
+use std::str::FromStr;
 
 /// Every setting of every stage for one task: what a pipeline file holds.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -41,4 +47,94 @@ pub struct Pipeline {
     /// `hilt evaluate`.
     #[serde(default)]
     pub evaluate: EvaluateSettings,
+}
+
+/// A stage that writes an artefact.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Stage {
+    /// Demonstrations as joint trajectories.
+    Plan,
+    /// Their execution in contact physics.
+    Simulate,
+    /// Recordings to datasets.
+    Convert,
+    /// The dynamics network.
+    Pretrain,
+    /// The policy.
+    Train,
+    /// Rollouts of a policy.
+    Evaluate,
+}
+
+impl Stage {
+    /// All stages, in the order of the pipeline.
+    pub const ALL: [Stage; 6] = [Stage::Plan, Stage::Simulate, Stage::Convert, Stage::Pretrain, Stage::Train, Stage::Evaluate];
+
+    /// The subcommand's name.
+    pub fn name(self) -> &'static str {
+        ["plan", "simulate", "convert", "pretrain", "train", "evaluate"][self as usize]
+    }
+
+    /// The sections of a pipeline file that can change what this stage writes, given its input files.
+    pub fn sections(self) -> &'static [&'static str] {
+        match self {
+            Stage::Plan => &["scene", "plan"],
+            Stage::Simulate => &["simulate"],
+            Stage::Convert => &["convert"],
+            Stage::Pretrain => &["pretrain"],
+            Stage::Train => &["train"],
+            Stage::Evaluate => &["scene", "plan", "simulate", "evaluate"],
+        }
+    }
+}
+
+impl FromStr for Stage {
+    type Err = String;
+
+    fn from_str(s: &str) -> std::result::Result<Self, String> {
+        Stage::ALL
+            .into_iter()
+            .find(|stage| stage.name() == s)
+            .ok_or_else(|| format!("unknown stage \"{s}\"; allowed: {}", Stage::ALL.map(Stage::name).join(", ")))
+    }
+}
+
+impl Pipeline {
+    /// Every setting of `task` at its default.
+    pub fn defaults(task: Task) -> Self {
+        Pipeline {
+            task,
+            scene: SceneSettings::default(),
+            plan: PlanSettings::default(),
+            simulate: SimulateSettings::default(),
+            convert: ConvertSettings::default(),
+            pretrain: PretrainSettings::default(),
+            train: TrainSettings::default(),
+            evaluate: EvaluateSettings::default(),
+        }
+    }
+
+    /// The resolved settings as a TOML document: all of them, or those that `stage` reads.
+    ///
+    /// # Errors
+    /// [`Error::Failed`] when a value has no form in TOML.
+    pub fn to_toml(&self, stage: Option<Stage>) -> Result<String> {
+        let mut table = self.to_table()?;
+        table.retain(|key, _| key == "task" || stage.is_none_or(|stage| stage.sections().contains(&key)));
+        toml::to_string(&table).map_err(|e| Error::Failed(format!("settings cannot be written as TOML: {e}")))
+    }
+
+    /// The settings that `stage` reads, as they go into the provenance of what it writes.
+    ///
+    /// # Errors
+    /// [`Error::Failed`] when a value has no form in JSON.
+    pub fn to_json(&self, stage: Stage) -> Result<serde_json::Value> {
+        let mut table = self.to_table()?;
+        table.retain(|key, _| stage.sections().contains(&key));
+        serde_json::to_value(table).map_err(|e| Error::Failed(format!("settings cannot be written as JSON: {e}")))
+    }
+
+    fn to_table(&self) -> Result<toml::Table> {
+        toml::Table::try_from(self).map_err(|e| Error::Failed(format!("settings cannot be written as TOML: {e}")))
+    }
 }

@@ -1,0 +1,81 @@
+//! The flags that all stages share: which settings, which seed.
+
+use crate::config::{Pipeline, Preset, Source, Stage};
+use crate::data::Provenance;
+use crate::error::{Error, Result};
+use crate::tasks::Task;
+use std::path::{Path, PathBuf};
+
+/// Where artefacts go unless a flag says otherwise.
+const RUNS: &str = "runs";
+
+/// Which settings: a preset of a task or a pipeline file, then `--set`, then flags of the stage.
+#[derive(Debug, clap::Args)]
+pub struct SettingsArgs {
+    /// Task: pick-up, pick-and-place or stack
+    #[arg(long, value_name = "TASK")]
+    task: Option<Task>,
+    /// Pipeline file with the settings of every stage [default: the one of the task that comes with hilt]
+    #[arg(long, value_name = "FILE")]
+    pipeline: Option<PathBuf>,
+    /// Settings that come with hilt: best (every documented mend) or paper (as literal as can work) [default: best]
+    #[arg(long, value_name = "PRESET", conflicts_with = "pipeline")]
+    preset: Option<Preset>,
+    /// Override one setting, in TOML; may be repeated (--set plan.speed=0.5 --set scene.yaw=true)
+    #[arg(long, value_name = "STAGE.KEY=VALUE")]
+    set: Vec<String>,
+    /// Seed of every random number
+    #[arg(long, value_name = "S", default_value_t = 0)]
+    pub seed: u64,
+}
+
+/// A flag that stands for one setting.
+pub type Flag<'a> = (&'a str, Option<String>);
+
+impl SettingsArgs {
+    /// The resolved settings; `flags` are dotted keys with the values of the stage's own flags, where given.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] when neither task nor pipeline file is given; see [`Pipeline::load`].
+    pub fn resolve(&self, flags: &[Flag]) -> Result<Pipeline> {
+        let source = match (&self.pipeline, self.task) {
+            (Some(path), task) => Source::File(path.clone(), task),
+            (None, Some(task)) => Source::BuiltIn(task, self.preset.unwrap_or_default()),
+            (None, None) => {
+                let tasks = Task::ALL.map(Task::name).join(", ");
+                return Err(Error::Usage(format!("which task? give --task ({tasks}) or --pipeline FILE")));
+            }
+        };
+        let mut sets = self.set.clone();
+        sets.extend(flags.iter().filter_map(|(key, value)| value.as_ref().map(|value| format!("{key}={value}"))));
+        Pipeline::load(&source, &sets)
+    }
+
+    /// What made an artefact of `stage`: the settings it reads, the seed, the hashes of its inputs.
+    ///
+    /// # Errors
+    /// [`Error::Io`] when an input cannot be read.
+    pub fn provenance(&self, stage: Stage, pipeline: &Pipeline, inputs: &[&Path]) -> Result<Provenance> {
+        let provenance = Provenance::new(stage.name(), pipeline.task, pipeline.to_json(stage)?, self.seed);
+        inputs.iter().try_fold(provenance, |provenance, input| provenance.with_input(input))
+    }
+}
+
+/// The given path, or `name` under `runs/<task>/`.
+pub fn path_or(given: Option<&Path>, task: Task, name: &str) -> PathBuf {
+    given.map_or_else(|| Path::new(RUNS).join(task.name()).join(name), Path::to_path_buf)
+}
+
+/// Refuses an input that was made for another task.
+///
+/// # Errors
+/// [`Error::Input`] naming both tasks.
+pub fn same_task(path: &Path, made_for: Task, task: Task) -> Result<()> {
+    if made_for == task {
+        return Ok(());
+    }
+    Err(Error::input(
+        path,
+        format!("was made for task {made_for}, but task {task} is asked for; give --task {made_for} or another file"),
+    ))
+}

@@ -1,0 +1,115 @@
+//! Words and progress on stderr: bars on a terminal, plain lines otherwise; with `--log`, the plain lines in a file as well.
+
+use crate::error::{Error, Result};
+use indicatif::{MultiProgress, ProgressBar, ProgressDrawTarget, ProgressStyle};
+use std::fs::File;
+use std::io::{IsTerminal, Write, stderr};
+use std::path::Path;
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::time::Instant;
+
+/// Plain progress lines per stage.
+const PLAIN_LINES: u64 = 10;
+
+/// Where words go.
+#[derive(Debug)]
+pub struct Console {
+    quiet: bool,
+    log: Option<Mutex<File>>,
+    bars: MultiProgress,
+}
+
+impl Console {
+    /// `quiet` keeps stderr for errors; `log` is created or emptied, with the directories above it.
+    ///
+    /// # Errors
+    /// [`Error::Io`] when the log cannot be created.
+    pub fn new(quiet: bool, log: Option<&Path>) -> Result<Self> {
+        let show_bars = !quiet && stderr().is_terminal();
+        let target = if show_bars { ProgressDrawTarget::stderr() } else { ProgressDrawTarget::hidden() };
+        let log = log.map(create).transpose()?.map(Mutex::new);
+        Ok(Console { quiet, log, bars: MultiProgress::with_draw_target(target) })
+    }
+
+    /// A line for people. Nobody is told when stderr or a full disk refuses it: words are no result.
+    pub fn say(&self, line: &str) {
+        self.to_log(line);
+        if !self.quiet {
+            self.bars.suspend(|| {
+                let _ = writeln!(stderr(), "{line}");
+            });
+        }
+    }
+
+    fn to_log(&self, line: &str) {
+        if let Some(mut log) = self.log.as_ref().and_then(|log| log.lock().ok()) {
+            let _ = writeln!(log, "{line}");
+        }
+    }
+
+    /// Begins to count `total` items of work, called `unit` ("plans").
+    pub fn progress(&self, stage: &'static str, total: u64, unit: &'static str) -> Progress<'_> {
+        let bar = (!self.bars.is_hidden()).then(|| {
+            let style = ProgressStyle::with_template("{prefix} {wide_bar} {pos}/{len} {msg} {per_sec} eta {eta}")
+                .expect("the template of the bar is well formed");
+            self.bars.add(ProgressBar::new(total).with_style(style).with_prefix(stage).with_message(unit))
+        });
+        Progress { console: self, stage, unit, total, bar, done: AtomicU64::new(0), started: Instant::now() }
+    }
+}
+
+fn create(path: &Path) -> Result<File> {
+    let io = |e| Error::io(path, "create", e);
+    if let Some(parent) = path.parent() {
+        std::fs::create_dir_all(parent).map_err(io)?;
+    }
+    File::create(path).map_err(io)
+}
+
+/// Counts items of work, from any thread.
+#[derive(Debug)]
+pub struct Progress<'a> {
+    console: &'a Console,
+    stage: &'static str,
+    unit: &'static str,
+    total: u64,
+    bar: Option<ProgressBar>,
+    done: AtomicU64,
+    started: Instant,
+}
+
+impl Progress<'_> {
+    /// The work began earlier, at `started`.
+    pub fn since(mut self, started: Instant) -> Self {
+        self.started = started;
+        self
+    }
+
+    /// One more item is done.
+    pub fn step(&self) {
+        self.step_with("");
+    }
+
+    /// One more item is done; `more` words say how it stands.
+    pub fn step_with(&self, more: &str) {
+        let done = self.done.fetch_add(1, Ordering::Relaxed) + 1;
+        if let Some(bar) = &self.bar {
+            bar.set_message(format!("{}{more}", self.unit));
+            bar.inc(1);
+        } else if done < self.total && done * PLAIN_LINES / self.total != (done - 1) * PLAIN_LINES / self.total {
+            self.console.say(&format!("{}: {done}/{} {}{more}", self.stage, self.total, self.unit));
+        }
+    }
+
+    /// The stage is over: its wall time and rate, and `more` words.
+    pub fn finish(self, more: &str) {
+        if let Some(bar) = &self.bar {
+            bar.finish_and_clear();
+        }
+        let seconds = self.started.elapsed().as_secs_f64();
+        let done = self.done.load(Ordering::Relaxed);
+        let rate = done as f64 / seconds.max(f64::MIN_POSITIVE);
+        self.console.say(&format!("{}: {done} {} in {seconds:.1} s ({rate:.1} per second){more}", self.stage, self.unit));
+    }
+}

@@ -1,0 +1,37 @@
+//! Episodes that fell out: counted and named, never silent.
+
+use super::{Console, Outcome};
+use crate::error::{Error, Result};
+
+/// Named one by one up to this many; the rest is counted.
+const NAMED: usize = 20;
+
+/// An item, or why it was dropped ("episode 3: ...").
+pub type Kept<T> = std::result::Result<T, String>;
+
+/// Keeps what came through and says what did not.
+///
+/// # Errors
+/// [`Error::Failed`] when nothing came through, with the first reason.
+pub fn keep<T>(stage: &str, items: Vec<Kept<T>>, console: &Console) -> Result<(Vec<T>, Outcome)> {
+    let total = items.len();
+    let (mut kept, mut reasons) = (Vec::with_capacity(total), Vec::new());
+    for item in items {
+        match item {
+            Ok(item) => kept.push(item),
+            Err(reason) => reasons.push(reason),
+        }
+    }
+    let Some(first) = reasons.first() else {
+        return Ok((kept, Outcome::Done));
+    };
+    if kept.is_empty() {
+        return Err(Error::Failed(format!("{stage}: all {total} episodes were dropped; the first: {first}")));
+    }
+    console.say(&format!("{stage}: dropped {} of {total} episodes:", reasons.len()));
+    reasons.iter().take(NAMED).for_each(|reason| console.say(&format!("  {reason}")));
+    if reasons.len() > NAMED {
+        console.say(&format!("  and {} more", reasons.len() - NAMED));
+    }
+    Ok((kept, Outcome::Dropped(reasons.len() as u64)))
+}

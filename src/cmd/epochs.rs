@@ -1,0 +1,54 @@
+//! The progress of learning: one count per part (pretraining, warm start, Algorithm 1), with the losses as they stand.
+
+use super::{Console, Progress};
+use crate::learn::EpochMetrics;
+use std::time::Instant;
+
+/// Follows the epochs of one stage.
+pub struct Epochs<'a> {
+    console: &'a Console,
+    running: Option<(&'static str, Progress<'a>)>,
+    /// When the running part began: its first report comes after its first epoch.
+    began: Instant,
+}
+
+impl<'a> Epochs<'a> {
+    /// Before the first epoch.
+    pub fn new(console: &'a Console) -> Self {
+        Epochs { console, running: None, began: Instant::now() }
+    }
+
+    /// One more epoch is done.
+    pub fn step(&mut self, epoch: &EpochMetrics) {
+        if self.running.as_ref().is_none_or(|(part, _)| *part != epoch.stage) {
+            self.finish();
+            self.running = Some((epoch.stage, self.console.progress(epoch.stage, epoch.epochs, "epochs").since(self.began)));
+        }
+        if let Some((_, progress)) = &self.running {
+            progress.step_with(&words(epoch));
+        }
+    }
+
+    /// The part that runs is over.
+    pub fn finish(&mut self) {
+        if let Some((_, progress)) = self.running.take() {
+            progress.finish("");
+            self.began = Instant::now();
+        }
+    }
+}
+
+/// What is known of the epoch, in words; what was not computed is left out.
+fn words(epoch: &EpochMetrics) -> String {
+    let values = [
+        ("l_bc", epoch.l_bc),
+        ("l_sc", epoch.l_sc),
+        ("d_conv", epoch.d_conv),
+        ("alpha", epoch.alpha),
+        ("l_model", epoch.l_model),
+        ("validation l_bc", epoch.validation_l_bc),
+        ("validation l_model", epoch.validation_l_model),
+    ];
+    let known = values.iter().filter(|(_, value)| value.is_finite());
+    known.map(|(name, value)| format!(", {name} {value:.4}")).collect()
+}

@@ -1,0 +1,50 @@
+use super::common::{SettingsArgs, path_or};
+use super::{Context, Outcome, dropped};
+use crate::config::Stage;
+use crate::data::table_file;
+use crate::error::Result;
+use crate::plan::{Planner, to_table};
+use crate::seed;
+use crate::tasks::draw_scene;
+use rayon::prelude::*;
+use std::path::PathBuf;
+
+/// Plan demonstrations: random scenes, and for each a collision-free, smooth joint trajectory.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    #[command(flatten)]
+    settings: SettingsArgs,
+    /// Demonstrations to plan [default: plan.episodes]
+    #[arg(long, value_name = "N")]
+    episodes: Option<u64>,
+    /// Parquet file to write [default: runs/<TASK>/plans.parquet]
+    #[arg(long, value_name = "FILE")]
+    out: Option<PathBuf>,
+}
+
+pub fn run(args: &Args, context: &Context) -> Result<Outcome> {
+    let pipeline = args.settings.resolve(&[("plan.episodes", args.episodes.map(|n| n.to_string()))])?;
+    let (task, seed) = (pipeline.task, args.settings.seed);
+    let out = path_or(args.out.as_deref(), task, "plans.parquet");
+    let provenance = args.settings.provenance(Stage::Plan, &pipeline, &[])?;
+
+    let progress = context.console.progress("plan", pipeline.plan.episodes, "plans");
+    let plans: Vec<dropped::Kept<_>> = (0..pipeline.plan.episodes)
+        .into_par_iter()
+        .map_init(
+            || Planner::new(&pipeline.plan),
+            |planner, index| {
+                context.interrupt.check()?;
+                let scene = draw_scene(task, &pipeline.scene, &mut seed::stream(seed, "plan.scene", index))?;
+                let plan = planner.plan(index, &scene, &mut seed::stream(seed, "plan.search", index));
+                progress.step();
+                Ok(plan.map_err(|e| format!("episode {index}: {e}")))
+            },
+        )
+        .collect::<Result<_>>()?;
+    progress.finish("");
+    let (plans, outcome) = dropped::keep("plan", plans, &context.console)?;
+    table_file::write(&out, &to_table(&plans), &provenance)?;
+    context.console.say(&format!("plan: wrote {}", out.display()));
+    Ok(outcome)
+}

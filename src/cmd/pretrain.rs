@@ -1,0 +1,54 @@
+use super::common::{SettingsArgs, path_or};
+use super::epochs::Epochs;
+use super::{Context, Outcome, output};
+use crate::config::Stage;
+use crate::data::{dataset, table_file, weights};
+use crate::demo::Demo;
+use crate::error::Result;
+use crate::learn::{EpochMetrics, pretrain_dynamics};
+use crate::tasks::Task;
+use std::path::{Path, PathBuf};
+
+/// Kind of the weights that this stage writes.
+pub const KIND: &str = "dynamics";
+
+/// Learn the dynamics network from the demonstrations (Algorithm 4) and report its errors per state group.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    #[command(flatten)]
+    settings: SettingsArgs,
+    /// Directory with the datasets train and validation [default: runs/<TASK>/dataset]
+    #[arg(long, value_name = "DIR")]
+    dataset: Option<PathBuf>,
+    /// Weights to write, with their errors (same name, .parquet) and pretraining.parquet, the epochs, beside them [default: runs/<TASK>/dynamics.safetensors]
+    #[arg(long, value_name = "FILE.safetensors")]
+    out: Option<PathBuf>,
+}
+
+pub fn run(args: &Args, context: &Context) -> Result<Outcome> {
+    let pipeline = args.settings.resolve(&[])?;
+    let dir = path_or(args.dataset.as_deref(), pipeline.task, "dataset");
+    let out = path_or(args.out.as_deref(), pipeline.task, "dynamics.safetensors");
+    let (train, validation) = demos(&dir, pipeline.task)?;
+    let provenance = args.settings.provenance(Stage::Pretrain, &pipeline, &[&dir])?;
+
+    let mut epochs = Epochs::new(&context.console);
+    let seed = args.settings.seed;
+    let mut log = |epoch: &EpochMetrics| epochs.step(epoch);
+    let (dynamics, report) = pretrain_dynamics(&train, &validation, &pipeline.pretrain, seed, &mut log, &context.interrupt)?;
+    epochs.finish();
+    context.console.say(output::table_text(&report.errors).trim_end());
+    table_file::write(&out.with_extension("parquet"), &report.errors, &provenance)?;
+    table_file::write(&out.with_file_name("pretraining.parquet"), &report.metrics, &provenance)?;
+    weights::write(&out, KIND, &dynamics.to_tensors(), &dynamics.meta(), &provenance)?;
+    context.console.say(&format!("pretrain: wrote {}", out.display()));
+    Ok(Outcome::Done)
+}
+
+/// Training and validation demos; no validation root means no validation demo.
+pub fn demos(dir: &Path, task: Task) -> Result<(Vec<Demo>, Vec<Demo>)> {
+    let train = dataset::read_for(&dir.join(dataset::TRAIN), task)?.demos;
+    let root = dir.join(dataset::VALIDATION);
+    let validation = if root.exists() { dataset::read_for(&root, task)?.demos } else { Vec::new() };
+    Ok((train, validation))
+}

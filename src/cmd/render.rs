@@ -1,0 +1,65 @@
+use super::{Context, Outcome};
+use crate::data::{atomic, recording};
+use crate::error::Result;
+use crate::report::render::{GifOptions, write_gif, write_png_sheet};
+use std::path::PathBuf;
+
+/// Draw a recorded episode: an animated GIF, or a contact sheet as PNG.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// Recording
+    #[arg(value_name = "FILE.mcap")]
+    recording: PathBuf,
+    #[command(flatten)]
+    format: Format,
+    /// Width of a picture in pixels
+    #[arg(long, value_name = "PIXELS", default_value_t = 480)]
+    width: u32,
+    /// Height of a picture in pixels
+    #[arg(long, value_name = "PIXELS", default_value_t = 360)]
+    height: u32,
+    /// Animation: control steps per picture
+    #[arg(long, value_name = "N", default_value_t = 2)]
+    every: u32,
+    /// Animation: pictures per second
+    #[arg(long, value_name = "N", default_value_t = 10)]
+    fps: u32,
+    /// Contact sheet: pictures side by side
+    #[arg(long, value_name = "N", default_value_t = 4)]
+    columns: u32,
+    /// Contact sheet: rows of pictures
+    #[arg(long, value_name = "N", default_value_t = 3)]
+    rows: u32,
+    /// File to write [default: the recording's name with .gif or .png]
+    #[arg(long, value_name = "FILE")]
+    out: Option<PathBuf>,
+}
+
+#[derive(Debug, clap::Args)]
+#[group(required = true, multiple = false)]
+struct Format {
+    /// Write an animation
+    #[arg(long)]
+    gif: bool,
+    /// Write a contact sheet
+    #[arg(long)]
+    png: bool,
+}
+
+pub fn run(args: &Args, context: &Context) -> Result<Outcome> {
+    let (episode, _) = recording::read(&args.recording)?;
+    let size = (args.width, args.height);
+    let mut bytes = Vec::new();
+    if args.format.gif {
+        let options = GifOptions { width: args.width, height: args.height, every_n_steps: args.every, fps: args.fps };
+        write_gif(&episode, &options, &mut bytes)?;
+    } else {
+        write_png_sheet(&episode, args.columns, args.rows, size, &mut bytes)?;
+    }
+    context.interrupt.check()?;
+    let ending = if args.format.gif { "gif" } else { "png" };
+    let out = args.out.clone().unwrap_or_else(|| args.recording.with_extension(ending));
+    atomic::write_bytes(&out, &bytes)?;
+    context.console.say(&format!("render: wrote {}", out.display()));
+    Ok(Outcome::Done)
+}

@@ -1,0 +1,20 @@
+use super::common::SettingsArgs;
+use super::{Outcome, output};
+use crate::config::Stage;
+use crate::error::Result;
+
+/// Print the resolved settings of a task as TOML, itself a valid pipeline file.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    #[command(flatten)]
+    settings: SettingsArgs,
+    /// Only the sections that this stage reads: plan, simulate, convert, pretrain, train or evaluate
+    #[arg(long, value_name = "STAGE")]
+    stage: Option<Stage>,
+}
+
+pub fn run(args: &Args) -> Result<Outcome> {
+    let pipeline = args.settings.resolve(&[])?;
+    output::print(&format!("# seed {}\n{}", args.settings.seed, pipeline.to_toml(args.stage)?))?;
+    Ok(Outcome::Done)
+}

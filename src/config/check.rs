@@ -1,0 +1,107 @@
+//! Refuses settings that are unknown, of a wrong type or out of range, and says what is allowed.
+
+use super::Pipeline;
+use super::ranges::{RANGES, Range};
+use crate::error::{Error, Result};
+use crate::scene::Obstacle;
+use crate::tasks::Task;
+use toml::{Table, Value};
+
+/// A table as checked settings; `origin` says in an error where they were written.
+pub(super) fn resolve(table: Table, origin: &str) -> Result<Pipeline> {
+    unknown_keys(&table, origin)?;
+    let pipeline: Pipeline = serde_path_to_error::deserialize(Value::Table(table.clone())).map_err(|e| {
+        let key = plain_key(&e.path().to_string());
+        let value = find(&table, &key).map_or(String::new(), |v| format!(" = {v}"));
+        let allowed = Range::of(&key).map_or(String::new(), |r| format!("; allowed: {r}"));
+        let reason = e.inner().to_string();
+        let reason = reason.lines().next().unwrap_or_default();
+        Error::Usage(format!("{origin}: {}{value}: {reason}{allowed}", e.path()))
+    })?;
+    for (key, value) in leaves(&pipeline.to_table()?) {
+        if let Some(range) = Range::of(&key) {
+            range.check(&key, &value).map_err(|why| Error::Usage(format!("{origin}: {why}")))?;
+        }
+    }
+    for learning in [pipeline.pretrain.validate(), pipeline.train.validate()] {
+        learning.map_err(|why| Error::Usage(format!("{origin}: {why}")))?;
+    }
+    ordered("scene.spawn_x_m", pipeline.scene.spawn_x_m, origin)?;
+    ordered("scene.spawn_y_m", pipeline.scene.spawn_y_m, origin)?;
+    Ok(pipeline)
+}
+
+fn ordered(key: &str, [low, high]: [f64; 2], origin: &str) -> Result<()> {
+    if low <= high {
+        return Ok(());
+    }
+    Err(Error::Usage(format!("{origin}: {key} = [{low}, {high}]: allowed: the lower end first, [low, high]")))
+}
+
+fn unknown_keys(table: &Table, origin: &str) -> Result<()> {
+    let known = known_keys();
+    for (key, _) in leaves(table) {
+        if !known.contains(&key) && !known.iter().any(|k| k.starts_with(&format!("{key}."))) {
+            let hint = nearest(&key).map_or(String::new(), |known| format!("; did you mean {known}?"));
+            return Err(Error::Usage(format!("{origin}: unknown key {key}{hint} (`hilt settings` prints all keys)")));
+        }
+    }
+    Ok(())
+}
+
+/// The known dotted key that looks most like `key`: by its full name, or by its last part alone.
+pub(super) fn nearest(key: &str) -> Option<String> {
+    let last = |k: &str| k.rsplit('.').next().unwrap_or_default().to_string();
+    let mut known = known_keys();
+    known.extend(known_sections());
+    known.into_iter().min_by_key(|k| {
+        let full = strsim::damerau_levenshtein(k, key);
+        full.min(strsim::damerau_levenshtein(&last(k), &last(key)) + 1)
+    })
+}
+
+/// Every dotted key that a pipeline file may hold, found by writing out the defaults with one obstacle in them.
+fn known_keys() -> Vec<String> {
+    let mut keys: Vec<String> = leaves(&example()).into_iter().map(|(key, _)| key).collect();
+    keys.extend(RANGES.iter().map(|r| r.key.to_string()));
+    keys.push("scene.obstacles".into());
+    keys
+}
+
+fn known_sections() -> Vec<String> {
+    example().iter().filter(|(_, v)| v.is_table()).map(|(k, _)| k.clone()).collect()
+}
+
+pub(super) fn example() -> Table {
+    let mut pipeline = Pipeline::defaults(Task::PickUp);
+    pipeline.scene.obstacles = vec![Obstacle { center_m: [0.0; 3], size_m: [1.0; 3] }];
+    pipeline.to_table().expect("default settings have a form in TOML")
+}
+
+/// All values that are not tables, under dotted keys; a list of tables shares one key without its positions.
+pub(super) fn leaves(table: &Table) -> Vec<(String, Value)> {
+    fn walk(key: &str, value: &Value, out: &mut Vec<(String, Value)>) {
+        let under = |name: &str| if key.is_empty() { name.to_string() } else { format!("{key}.{name}") };
+        match value {
+            Value::Table(inner) if !inner.is_empty() => inner.iter().for_each(|(name, v)| walk(&under(name), v, out)),
+            Value::Array(items) if items.first().is_some_and(Value::is_table) => items.iter().for_each(|v| walk(key, v, out)),
+            _ => out.push((key.to_string(), value.clone())),
+        }
+    }
+    let mut out = Vec::new();
+    for (name, value) in table {
+        walk(name, value, &mut out);
+    }
+    out
+}
+
+/// `scene.obstacles[0].size_m[2]` as `scene.obstacles.size_m`.
+fn plain_key(path: &str) -> String {
+    path.split('.').map(|part| part.split('[').next().unwrap_or_default()).collect::<Vec<_>>().join(".")
+}
+
+fn find<'a>(table: &'a Table, key: &str) -> Option<&'a Value> {
+    let mut parts = key.split('.');
+    let first = table.get(parts.next()?)?;
+    parts.try_fold(first, |at, part| at.get(part))
+}
