@@ -51,13 +51,13 @@ impl SettingsArgs {
         Pipeline::load(&source, &sets)
     }
 
-    /// What made an artefact of `stage`: the settings it reads, the seed, the hashes of its inputs.
+    /// What made an artefact of `stage`: the settings it reads, the seed, the hashes of its inputs by role ("plans", "dataset").
     ///
     /// # Errors
     /// [`Error::Io`] when an input cannot be read.
-    pub fn provenance(&self, stage: Stage, pipeline: &Pipeline, inputs: &[&Path]) -> Result<Provenance> {
+    pub fn provenance(&self, stage: Stage, pipeline: &Pipeline, inputs: &[(&str, &Path)]) -> Result<Provenance> {
         let provenance = Provenance::new(stage.name(), pipeline.task, pipeline.to_json(stage)?, self.seed);
-        inputs.iter().try_fold(provenance, |provenance, input| provenance.with_input(input))
+        inputs.iter().try_fold(provenance, |provenance, (role, path)| provenance.with_input(role, path))
     }
 }
 

@@ -43,7 +43,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome> {
     let (train, validation) = dataset::split(kept.len(), pipeline.convert.train_per_validation, args.settings.seed);
     let pick =
         |indices: &[usize]| -> Vec<_> { indices.iter().map(|i| dataset::DatasetEpisode::of(&kept[*i].0, &kept[*i].1)).collect() };
-    let provenance = args.settings.provenance(Stage::Convert, &pipeline, &[&dir])?;
+    let provenance = args.settings.provenance(Stage::Convert, &pipeline, &[("recordings", &dir)])?;
     dataset::write_split(&out, pipeline.task, &pick(&train), &pick(&validation), &provenance)?;
     let (to, t, v) = (out.display(), train.len(), validation.len());
     context.console.say(&format!("convert: wrote {to}: {t} training and {v} validation episodes"));

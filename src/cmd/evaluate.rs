@@ -45,10 +45,10 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome> {
     let path = path_or(args.policy.as_deref(), pipeline.task, "policy.safetensors");
     let by_planner = path == Path::new(PLANNER);
 
-    let (trials, inputs): (_, Vec<&Path>) = if by_planner {
+    let (trials, inputs): (_, Vec<(&str, &Path)>) = if by_planner {
         (planner(args, &pipeline, context)?, vec![])
     } else {
-        (policy(args, &path, &pipeline, context)?, vec![&path])
+        (policy(args, &path, &pipeline, context)?, vec![("policy", &path)])
     };
     let summary = Summary::of(pipeline.task, &trials);
     if let Some(out) = &args.out {

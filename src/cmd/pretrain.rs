@@ -30,7 +30,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome> {
     let dir = path_or(args.dataset.as_deref(), pipeline.task, "dataset");
     let out = path_or(args.out.as_deref(), pipeline.task, "dynamics.safetensors");
     let (train, validation) = demos(&dir, pipeline.task)?;
-    let provenance = args.settings.provenance(Stage::Pretrain, &pipeline, &[&dir])?;
+    let provenance = args.settings.provenance(Stage::Pretrain, &pipeline, &[("dataset", &dir)])?;
 
     let mut epochs = Epochs::new(&context.console);
     let seed = args.settings.seed;

@@ -39,7 +39,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome> {
         return Err(Error::input(&path, "holds no plan; run `hilt plan` again"));
     }
     let robot = urdf();
-    let provenance = args.settings.provenance(Stage::Simulate, &pipeline, &[&path])?;
+    let provenance = args.settings.provenance(Stage::Simulate, &pipeline, &[("plans", &path)])?;
 
     let progress = context.console.progress("simulate", plans.len() as u64, "episodes");
     let (solved, steps) = (AtomicU64::new(0), AtomicU64::new(0));

@@ -49,7 +49,8 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome> {
     let (demos, validation) = pretrain::demos(&dir, pipeline.task)?;
     let needs_model = args.method != Method::Bc || args.dynamics.is_some();
     let dynamics = needs_model.then(|| read_dynamics(&model, pipeline.task)).transpose()?;
-    let inputs: &[&Path] = if needs_model { &[&dir, &model] } else { &[&dir] };
+    let all = [("dataset", dir.as_path()), ("dynamics", model.as_path())];
+    let inputs = if needs_model { &all[..] } else { &all[..1] };
     let mut provenance = args.settings.provenance(Stage::Train, &pipeline, inputs)?;
     provenance.settings["method"] = format!("{:?}", args.method).to_lowercase().into();
 
