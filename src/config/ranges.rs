@@ -22,7 +22,6 @@ const fn above(key: &'static str, low: f64, high: f64) -> Range {
     Range { key, low, high, above_low: true }
 }
 
-const NO_LIMIT: f64 = f64::INFINITY;
 /// The arm reaches 0.98 m; nothing that matters lies beyond this \[m\].
 const WORKSPACE_M: f64 = 2.0;
 /// More episodes than any experiment needs, few enough to fit in memory and in five-digit file names.
@@ -30,7 +29,7 @@ const MOST_EPISODES: f64 = 100_000.0;
 /// A run of 500 s; keeps a slip of the finger from allocating all memory.
 const MOST_STEPS: f64 = 10_000.0;
 
-/// One line for every number; a test holds the list complete.
+/// One line for every number outside `[pretrain]` and `[train]`, which check themselves; a test holds the list complete.
 pub(super) const RANGES: &[Range] = &[
     within("scene.spawn_x_m", -WORKSPACE_M, WORKSPACE_M),
     within("scene.spawn_y_m", -WORKSPACE_M, WORKSPACE_M),
@@ -78,11 +77,33 @@ impl Range {
 
 impl fmt::Display for Range {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match (self.above_low, self.high == NO_LIMIT) {
-            (true, true) => write!(f, "above {}", self.low),
-            (false, true) => write!(f, "{} or more", self.low),
-            (true, false) => write!(f, "above {} up to {}", self.low, self.high),
-            (false, false) => write!(f, "{} to {}", self.low, self.high),
+        let low = if self.above_low { format!("above {} up", self.low) } else { self.low.to_string() };
+        write!(f, "{low} to {}", self.high)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::config::check::{example, leaves};
+
+    fn is_number(value: &Value) -> bool {
+        match value {
+            Value::Integer(_) | Value::Float(_) => true,
+            Value::Array(items) => items.iter().any(is_number),
+            _ => false,
+        }
+    }
+
+    #[test]
+    fn every_number_has_a_range_and_every_range_a_number() {
+        let numbers: Vec<String> = leaves(&example()).into_iter().filter(|(_, v)| is_number(v)).map(|(k, _)| k).collect();
+        // The sections of learning check themselves.
+        for key in numbers.iter().filter(|k| !k.starts_with("pretrain.") && !k.starts_with("train.")) {
+            assert!(Range::of(key).is_some(), "{key} has no range");
+        }
+        for range in RANGES {
+            assert!(numbers.iter().any(|key| key == range.key), "{} is no key", range.key);
         }
     }
 }
