@@ -68,12 +68,17 @@ pub fn read(path: &Path) -> Result<(Table, Provenance)> {
     let provenance = parquet_file::provenance_of(path, &schema)?;
     let mut table = Table::default();
     for (i, field) in schema.fields().iter().enumerate() {
-        let values = gather(field.data_type(), batches.iter().map(|b| b.column(i)))
-            .ok_or_else(|| Error::input(path, format!("column {} has type {}", field.name(), field.data_type())))?;
+        let values =
+            gather(field.data_type(), batches.iter().map(|b| b.column(i))).ok_or_else(|| Error::input(path, no_table(field)))?;
         let doc = field.metadata().get(DOC).map(|d| d.to_string()).unwrap_or_default();
         table.columns.push(Column { name: field.name().clone(), doc, values });
     }
     Ok((table, provenance))
+}
+
+fn no_table(field: &Field) -> String {
+    let (name, kind) = (field.name(), field.data_type());
+    format!("is no table: column {name} has type {kind}; for a part of a dataset name the dataset's root")
 }
 
 fn to_batch(table: &Table) -> std::result::Result<RecordBatch, ArrowError> {

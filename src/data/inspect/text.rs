@@ -1,11 +1,11 @@
-//! An answer of `inspect` in words: fields as lines, nested objects indented, lists of objects as tables.
+//! An answer of `inspect` in words: plain fields as lines, then nested objects, indented, and lists of objects as tables.
 
 use serde_json::{Map, Value};
 
 /// Significant digits of a number.
 const DIGITS: i32 = 5;
 /// Fields that come first, in this order; the rest follows by name.
-const FIRST: [&str; 13] = [
+const FIRST: [&str; 14] = [
     "kind",
     "name",
     "task",
@@ -19,6 +19,7 @@ const FIRST: [&str; 13] = [
     "unit",
     "shape",
     "parameters",
+    "provenance",
 ];
 /// Statistics in their usual order, then words.
 const LAST: [&str; 6] = ["min", "max", "mean", "std", "not_finite", "doc"];
@@ -35,18 +36,28 @@ pub fn inspect_text(value: &Value) -> String {
 
 fn write_fields(fields: &Map<String, Value>, depth: usize, out: &mut String) {
     let indent = "  ".repeat(depth);
-    for key in ordered(fields.keys()) {
+    let (sections, lines): (Vec<&str>, Vec<&str>) = ordered(fields.keys()).into_iter().partition(|k| is_section(&fields[*k]));
+    for key in lines.into_iter().chain(sections) {
         match &fields[key] {
-            Value::Object(inner) if !inner.is_empty() => {
+            Value::Object(inner) if is_section(&fields[key]) => {
                 *out += &format!("{indent}{key}\n");
                 write_fields(inner, depth + 1, out);
             }
-            Value::Array(rows) if rows.iter().any(Value::is_object) => {
+            Value::Array(rows) if is_section(&fields[key]) => {
                 *out += &format!("{indent}{key}\n");
                 write_table(rows, depth + 1, out);
             }
             other => *out += &format!("{indent}{key}: {}\n", scalar(other)),
         }
+    }
+}
+
+/// Whether a value takes lines of its own.
+fn is_section(value: &Value) -> bool {
+    match value {
+        Value::Object(inner) => !inner.is_empty(),
+        Value::Array(rows) => rows.iter().any(Value::is_object),
+        _ => false,
     }
 }
 
