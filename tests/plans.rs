@@ -78,6 +78,8 @@ fn check_limits(plan: &Plan, limits: &Limits) {
             let bend = (after - 2.0 * now + before) / CONTROL_DT_S.powi(2);
             assert!(bend.abs() <= a, "joint {j} accelerates at {bend} rad/s^2");
             assert!(around[1].dq_rad_s[j].abs() <= v);
+            let change = around[2].dq_rad_s[j] - around[1].dq_rad_s[j];
+            assert!(change.abs() / CONTROL_DT_S <= a, "joint {j}'s velocity changes by {change} rad/s in a step");
             if around[1].phase == around[2].phase {
                 assert!((around[1].dq_rad_s[j] - (after - now) / CONTROL_DT_S).abs() < ROUNDING);
             }
