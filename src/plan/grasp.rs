@@ -39,11 +39,10 @@ pub(super) fn grasps(scene: &Scene) -> Vec<Knot> {
     QUARTER_TURNS.map(|k| knot([x, y, z + GRASP_OVER_CENTER_M], yaw + k * FRAC_PI_2)).to_vec()
 }
 
-/// Level hand poses that let a block, held at `grasp`, stand at its target: least turning first. Empty for a pick-up.
+/// Level hand poses that let a block, held at `grasp`, stand at its target: least turning first.
 pub(super) fn releases(scene: &Scene, grasp: &Knot) -> Vec<Knot> {
     let aligned = match scene.context {
-        Context::None => return Vec::new(),
-        Context::Goal(_) => 0.0,
+        Context::None | Context::Goal(_) => 0.0,
         Context::Base(base) => {
             quarter_turn(base.isometry().rotation.euler_angles().2 - scene.block.isometry().rotation.euler_angles().2)
         }

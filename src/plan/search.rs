@@ -2,7 +2,7 @@
 //! is level: every step goes to a level pose and takes the arm along by inverse kinematics, so a carried block stays upright.
 
 use super::path::{Knot, tool_pose};
-use super::world::{Block, SEARCH_CLEARANCE_M, World};
+use super::world::{Block, World};
 use crate::robot::Ik;
 use crate::state::JOINTS;
 use rand::{Rng, RngExt};
@@ -27,6 +27,8 @@ pub(super) struct Search<'a> {
     pub(super) ik: &'a mut Ik,
     pub(super) world: &'a World,
     pub(super) block: &'a Block,
+    /// Distance to keep from everything fixed \[m\].
+    pub(super) margin_m: f64,
     pub(super) iterations: usize,
     pub(super) shortcuts: usize,
 }
@@ -70,7 +72,7 @@ impl Search<'_> {
         let way = goal - from.knot;
         let knot = if way.norm() <= STEP_M { *goal } else { from.knot + way * (STEP_M / way.norm()) };
         let q = self.ik.solve(&tool_pose(&knot), &from.q).ok()?;
-        self.world.check_motion(&from.q, &q, self.block, SEARCH_CLEARANCE_M).ok()?;
+        self.world.check_motion(&from.q, &q, self.block, self.margin_m).ok()?;
         Some(Node { knot, q, parent: at })
     }
 

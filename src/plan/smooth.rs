@@ -125,7 +125,9 @@ fn bounds(path: &[f64], j: usize, limits: &Limits, near_limit: bool) -> Vec<f64>
     let bend = TIGHT * limits.acceleration_rad_s2[j] * CONTROL_DT_S.powi(2);
     let [low, high] = POSITION_LIMITS_RAD[j];
     let mut room: Vec<[f64; 2]> = Vec::with_capacity(3 * path.len());
-    room.extend((0..last).map(|k| at(path, k + 1) - at(path, k)).map(|d| [step - d, step + d]));
+    // The sample at rest has velocity 0 (it ends the phase before), so the first moving one starts from there.
+    let step_at = |k: isize| if k == 1 { step.min(bend) } else { step };
+    room.extend((0..last).map(|k| (step_at(k), at(path, k + 1) - at(path, k))).map(|(step, d)| [step - d, step + d]));
     room.extend((0..=last).map(|k| at(path, k + 1) - 2.0 * at(path, k) + at(path, k - 1)).map(|d| [bend - d, bend + d]));
     if near_limit {
         room.extend((1..last).map(|k| at(path, k)).map(|q| [high - q, q - low]));
@@ -209,11 +211,12 @@ mod tests {
     #[test]
     fn rounds_a_kink_off_within_the_limits_and_keeps_the_ends() {
         // Velocity jumps from 0 to 0.4 rad/s and back: far beyond the acceleration limit.
-        let samples: Vec<Q> = (0..60).map(|k: i32| [3.0 + 0.02 * f64::from((k - 15).clamp(0, 30)); JOINTS]).collect();
+        let samples: Vec<Q> = (0..60).map(|k: i32| [0.85 + 0.02 * f64::from((k - 15).clamp(0, 30)); JOINTS]).collect();
         let smoothed = smooth(&samples, &limits()).expect("there is time enough");
         assert_eq!((smoothed[0], smoothed[59]), (samples[0], samples[59]));
         for w in smoothed.windows(3) {
             assert!((w[1][0] - w[0][0]).abs() / CONTROL_DT_S <= 0.5);
+            assert!((0.82..1.51).contains(&w[1][0]));
             assert!((w[2][0] - 2.0 * w[1][0] + w[0][0]).abs() / CONTROL_DT_S.powi(2) <= 2.0);
         }
         let off = smoothed.iter().zip(&samples).map(|(a, b)| (a[0] - b[0]).abs()).fold(0.0, f64::max);

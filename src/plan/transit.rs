@@ -5,7 +5,7 @@ use super::path::{Knot, follow};
 use super::search::Search;
 use super::smooth::{Limits, smooth};
 use super::timing::time;
-use super::world::{Block, CLEARANCE_M, SEARCH_CLEARANCE_M, World};
+use super::world::{Block, CLEARANCE_M, World};
 use super::{PlanError, Planner};
 use crate::demo::Phase;
 use crate::state::JOINTS;
@@ -15,6 +15,8 @@ use rand::Rng;
 const CORNERS_M: [f64; 2] = [0.05, 0.015];
 /// Detours that are tried before a search: the same way, but this much higher \[m\].
 const HIGHER_M: [f64; 3] = [0.06, 0.12, 0.18];
+/// Rounding a corner of a searched path takes away less than this \[m\].
+const ROUNDING_M: f64 = 0.005;
 /// Each further attempt of the smoother takes this much more time.
 const STRETCH: f64 = 1.15;
 /// Attempts of the smoother.
@@ -30,6 +32,8 @@ pub(super) struct Leg {
     /// Fixed knots behind `to`: the last straight stretch down.
     pub(super) after: Vec<Knot>,
     pub(super) block: Block,
+    /// Distance that the path keeps before smoothing \[m\].
+    pub(super) margin_m: f64,
     /// Joint angles at the first knot \[rad\].
     pub(super) start: [f64; JOINTS],
 }
@@ -89,7 +93,7 @@ impl Planner {
         let transit = |why: String| PlanError::Transit(format!("{}: {why}", leg.phase.name()));
         let path = follow(&mut self.ik, knots, corner_m, &leg.start).map_err(|why| transit(why.to_string()))?;
         if world.has_obstacles() {
-            clear(world, &path, &leg.block, SEARCH_CLEARANCE_M).map_err(transit)?;
+            clear(world, &path, &leg.block, leg.margin_m).map_err(transit)?;
         }
         let smoothing = |why: String| PlanError::Smoothing(format!("{}: {why}", leg.phase.name()));
         let samples = smooth_path(&path, &self.limits).map_err(smoothing)?;
@@ -101,12 +105,13 @@ impl Planner {
         let ends = [&leg.from, &leg.to].map(|knot| self.reach(knot, &leg.start, "an end of the search"));
         let [from, to] = ends.map(|q| q.map_err(|why| why.to_string()));
         let (from, to) = (from?, to?);
+        let margin_m = leg.margin_m + ROUNDING_M;
         for q in [&from, &to] {
-            world.check(q, &leg.block, SEARCH_CLEARANCE_M).map_err(|why| format!("an end of the search is blocked: {why}"))?;
+            world.check(q, &leg.block, margin_m).map_err(|why| format!("an end of the search is blocked: {why}"))?;
         }
         let iterations = self.settings.search_iterations;
         let shortcuts = self.settings.shortcut_iterations;
-        let mut search = Search { ik: &mut self.ik, world, block: &leg.block, iterations, shortcuts };
+        let mut search = Search { ik: &mut self.ik, world, block: &leg.block, margin_m, iterations, shortcuts };
         search.connect((leg.from, from), (leg.to, to), rng).ok_or_else(|| {
             format!("no other way was found in {iterations} iterations; raise plan.search_iterations or move the obstacles")
         })

@@ -10,8 +10,8 @@ use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 
 /// Least distance of arm and carried block to anything fixed, in a finished plan \[m\].
 pub const CLEARANCE_M: f64 = 0.01;
-/// The same while a path is searched \[m\]: what smoothing may take away comes on top.
-pub(super) const SEARCH_CLEARANCE_M: f64 = 0.02;
+/// Distances that hand poses and paths keep before smoothing \[m\]: first twice as much, so that noise in execution has room; then what must be.
+pub(super) const PATH_CLEARANCES_M: [f64; 2] = [2.0 * CLEARANCE_M, CLEARANCE_M];
 /// Least height of hand and fingers above the table \[m\]: closed fingers reach 19 mm below the tool point.
 const HAND_TABLE_M: f64 = 0.002;
 /// Least distance of the open hand to the block \[m\]: the fingers straddle it.

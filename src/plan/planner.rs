@@ -1,0 +1,203 @@
+//! The planner: one attempt after another, each a grasp, its approach, and what follows.
+
+use super::grasp::{CARRY_RISE_M, LIFTED_CENTER_M, PREGRASP_RISE_M, RETREAT_RISE_M, grasps, raised, ready, releases};
+use super::path::{Knot, tool_pose};
+use super::smooth::Limits;
+use super::transit::{Leg, smooth_path};
+use super::world::{Block, PATH_CLEARANCES_M, World};
+use super::{CLOSED_RAD, Plan, PlanError, Waypoint};
+use crate::config::PlanSettings;
+use crate::demo::Phase;
+use crate::robot::jaco::PRESHAPE_RAD;
+use crate::robot::{Ik, READY_Q_RAD};
+use crate::scene::Scene;
+use crate::state::{ARM_JOINTS, CONTROL_DT_S, Context, JOINTS};
+use nalgebra::Isometry3;
+use rand::Rng;
+
+/// Pieces of the fingers' way, fine enough for its short acceleration.
+const FINGER_SAMPLES: usize = 10;
+
+/// Makes plans; keeps its arm and its programs between them, which leave no trace in the results.
+pub struct Planner {
+    pub(super) settings: PlanSettings,
+    pub(super) limits: Limits,
+    pub(super) ik: Ik,
+    /// See [`closing`].
+    closing: Vec<f64>,
+}
+
+impl Planner {
+    /// A planner with these settings.
+    pub fn new(settings: &PlanSettings) -> Self {
+        let limits = Limits::new(settings);
+        Planner { settings: settings.clone(), limits, ik: Ik::new(), closing: closing(&limits) }
+    }
+
+    /// Plans one demonstration of `scene`; `index` goes into the plan, `rng` is used only where a search is needed.
+    ///
+    /// # Errors
+    /// [`PlanError`]: which stage failed, and why; of several grasps, the one that came farthest.
+    pub fn plan(&mut self, index: u64, scene: &Scene, rng: &mut impl Rng) -> Result<Plan, PlanError> {
+        let world = World::new(scene);
+        let mut farthest: Option<PlanError> = None;
+        for margin_m in PATH_CLEARANCES_M {
+            for grasp in grasps(scene) {
+                match self.with_grasp(&Try { scene, world: &world, grasp, margin_m }, rng) {
+                    Ok(pieces) => return Ok(Plan { index, scene: scene.clone(), waypoints: waypoints(&pieces) }),
+                    Err(error) if farthest.as_ref().is_none_or(|f| error.progress() >= f.progress()) => farthest = Some(error),
+                    Err(_) => {}
+                }
+            }
+            if !world.has_obstacles() {
+                break;
+            }
+        }
+        Err(farthest.expect("there is at least one grasp candidate"))
+    }
+
+    /// The whole plan with one grasp and the first release that works.
+    fn with_grasp(&mut self, with: &Try, rng: &mut impl Rng) -> Result<Vec<Piece>, PlanError> {
+        let approach = self.approach(with, rng)?;
+        if with.scene.context == Context::None {
+            return self.lift(with, approach, rng);
+        }
+        let mut first = None;
+        for release in releases(with.scene, &with.grasp) {
+            match self.carry(with, &release, approach.clone(), rng) {
+                Ok(pieces) => return Ok(pieces),
+                Err(error) => first = first.or(Some(error)),
+            }
+        }
+        Err(first.expect("there is at least one release candidate"))
+    }
+
+    /// From the ready pose down to the grasp, and the fingers closed.
+    fn approach(&mut self, with: &Try, rng: &mut impl Rng) -> Result<Vec<Piece>, PlanError> {
+        let (block, grasp) = (Block::Free(with.scene.block.isometry()), with.grasp);
+        let above = raised(&grasp, PREGRASP_RISE_M);
+        let q_above = self.reach(&above, &READY_Q_RAD, "above the block")?;
+        let q = self.reach(&grasp, &q_above, "at the block")?;
+        with.world
+            .check(&q, &block, with.margin_m)
+            .map_err(|why| PlanError::Grasp(format!("with the open hand around the block, {why}")))?;
+        let (from, start) = (ready(), READY_Q_RAD);
+        let leg = Leg {
+            phase: Phase::Approach,
+            before: Vec::new(),
+            from,
+            to: above,
+            after: vec![grasp],
+            block,
+            margin_m: with.margin_m,
+            start,
+        };
+        let q = self.transit(with.world, &leg, rng)?;
+        let closing = Self::fingers(Phase::Close, &self.closing, &q[q.len() - 1]);
+        Ok(vec![Piece { phase: Phase::Approach, q }, closing])
+    }
+
+    /// Straight up with the block.
+    fn lift(&mut self, with: &Try, mut pieces: Vec<Piece>, rng: &mut impl Rng) -> Result<Vec<Piece>, PlanError> {
+        let lifted = raised(&with.grasp, LIFTED_CENTER_M - with.scene.block.position_m[2]);
+        let leg = with.straight_up(Phase::Carry, with.grasp, lifted, Block::Held(with.in_tool()), end_of(&pieces));
+        pieces.push(Piece { phase: Phase::Carry, q: self.transit(with.world, &leg, rng)? });
+        Ok(pieces)
+    }
+
+    /// Lift, move and lower; the fingers opened, and straight up.
+    fn carry(&mut self, with: &Try, release: &Knot, mut pieces: Vec<Piece>, rng: &mut impl Rng) -> Result<Vec<Piece>, PlanError> {
+        let (block, start, grasp) = (Block::Held(with.in_tool()), end_of(&pieces), with.grasp);
+        let height = grasp.z.max(release.z) + CARRY_RISE_M;
+        let (from, to) = (raised(&grasp, height - grasp.z), raised(release, height - release.z));
+        let q_above = self.reach(&to, &start, "above the target")?;
+        let mut q = self.reach(release, &q_above, "at the target")?;
+        let placed = Block::Free(tool_pose(release) * with.in_tool());
+        let at_target = |why| PlanError::Grasp(format!("with the block at its target, {why}"));
+        with.world.check(&q, &block, with.margin_m).map_err(at_target)?;
+        q[ARM_JOINTS..].fill(PRESHAPE_RAD);
+        with.world.check(&q, &placed, with.margin_m).map_err(at_target)?;
+        let (before, after) = (vec![grasp], vec![*release]);
+        let leg = Leg { phase: Phase::Carry, before, from, to, after, block, margin_m: with.margin_m, start };
+        pieces.push(Piece { phase: Phase::Carry, q: self.transit(with.world, &leg, rng)? });
+        let opening: Vec<f64> = self.closing.iter().rev().copied().collect();
+        pieces.push(Self::fingers(Phase::Open, &opening, &end_of(&pieces)));
+        let leg = with.straight_up(Phase::Retreat, *release, raised(release, RETREAT_RISE_M), placed, end_of(&pieces));
+        pieces.push(Piece { phase: Phase::Retreat, q: self.transit(with.world, &leg, rng)? });
+        Ok(pieces)
+    }
+
+    /// Joint angles at a hand pose, by way of `seed`.
+    pub(super) fn reach(&mut self, knot: &Knot, seed: &[f64; JOINTS], place: &str) -> Result<[f64; JOINTS], PlanError> {
+        self.ik.solve(&tool_pose(knot), seed).map_err(|why| {
+            PlanError::Grasp(format!(
+                "the level hand cannot reach {place}: {why}; it reaches 0.28 m to 0.68 m around the base, set the spawn area \
+                 (scene.spawn_x_m, scene.spawn_y_m) and scene.base_xy_m within"
+            ))
+        })
+    }
+
+    /// Fingers follow `angles`, the arm still.
+    fn fingers(phase: Phase, angles: &[f64], arm: &[f64; JOINTS]) -> Piece {
+        let at = |angle: &f64| std::array::from_fn(|j| if j < ARM_JOINTS { arm[j] } else { *angle });
+        Piece { phase, q: angles.iter().map(at).collect() }
+    }
+}
+
+/// Angles of a finger that closes from the open hand, at the control rate \[rad\]; backwards, it opens.
+fn closing(limits: &Limits) -> Vec<f64> {
+    let path: Vec<[f64; JOINTS]> = (0..=FINGER_SAMPLES)
+        .map(|k| {
+            let angle = PRESHAPE_RAD + (CLOSED_RAD - PRESHAPE_RAD) * k as f64 / FINGER_SAMPLES as f64;
+            std::array::from_fn(|j| if j < ARM_JOINTS { READY_Q_RAD[j] } else { angle })
+        })
+        .collect();
+    let samples = smooth_path(&path, limits).expect("the fingers' limits are constants that leave room");
+    samples.iter().map(|q| q[ARM_JOINTS]).collect()
+}
+
+/// One attempt: a scene, a grasp, and the distance to keep.
+struct Try<'a> {
+    scene: &'a Scene,
+    world: &'a World,
+    grasp: Knot,
+    margin_m: f64,
+}
+
+impl Try<'_> {
+    /// The held block's pose relative to the tool.
+    fn in_tool(&self) -> Isometry3<f64> {
+        tool_pose(&self.grasp).inv_mul(&self.scene.block.isometry())
+    }
+
+    /// A straight motion with nothing fixed before or behind it.
+    fn straight_up(&self, phase: Phase, from: Knot, to: Knot, block: Block, start: [f64; JOINTS]) -> Leg {
+        Leg { phase, before: Vec::new(), from, to, after: Vec::new(), block, margin_m: self.margin_m, start }
+    }
+}
+
+/// The samples of one phase, both ends included.
+#[derive(Clone, Debug)]
+struct Piece {
+    phase: Phase,
+    q: Vec<[f64; JOINTS]>,
+}
+
+/// Where the last piece ends.
+fn end_of(pieces: &[Piece]) -> [f64; JOINTS] {
+    let q = &pieces[pieces.len() - 1].q;
+    q[q.len() - 1]
+}
+
+/// The pieces one after another; each but the first leaves out the sample it begins with, the last of the one before.
+fn waypoints(pieces: &[Piece]) -> Vec<Waypoint> {
+    let mut waypoints = Vec::new();
+    for (number, piece) in pieces.iter().enumerate() {
+        for (k, q) in piece.q.iter().enumerate().skip(usize::from(number > 0)) {
+            let next = piece.q.get(k + 1).unwrap_or(q);
+            let dq_rad_s = std::array::from_fn(|j| (next[j] - q[j]) / CONTROL_DT_S);
+            waypoints.push(Waypoint { phase: piece.phase, q_rad: *q, dq_rad_s });
+        }
+    }
+    waypoints
+}
