@@ -13,6 +13,14 @@ pub struct Mlp {
     params: Vec<f32>,
 }
 
+/// Rows that go through all layers before the next rows do, so that their activations stay in the processor's cache.
+const BLOCK_ROWS: usize = 128;
+
+fn blocks(rows: Range<usize>) -> impl Iterator<Item = Range<usize>> {
+    let end = rows.end;
+    rows.step_by(BLOCK_ROWS).map(move |from| from..end.min(from + BLOCK_ROWS))
+}
+
 /// Activations and their gradients for up to `capacity` rows: the workspace of one thread.
 #[derive(Clone, Debug, Default)]
 pub struct Pass {
@@ -143,6 +151,10 @@ impl Mlp {
 
     /// `pass.output` of `rows` from `pass.input`.
     pub fn forward(&self, pass: &mut Pass, rows: Range<usize>) {
+        blocks(rows).for_each(|block| self.forward_block(pass, block));
+    }
+
+    fn forward_block(&self, pass: &mut Pass, rows: Range<usize>) {
         for layer in 0..self.layers() {
             let shape = self.shape(layer, &rows);
             let (weights, biases) = self.layer_ranges(layer);
@@ -160,6 +172,10 @@ impl Mlp {
 
     /// Gradients of the hidden layers of `rows` from `pass.d_output`; they stay in the workspace for the two calls below.
     pub fn backward(&self, pass: &mut Pass, rows: Range<usize>) {
+        blocks(rows).for_each(|block| self.backward_block(pass, block));
+    }
+
+    fn backward_block(&self, pass: &mut Pass, rows: Range<usize>) {
         for layer in (1..self.layers()).rev() {
             let shape = self.shape(layer, &rows);
             let (weights, _) = self.layer_ranges(layer);
@@ -184,6 +200,10 @@ impl Mlp {
     /// # Panics
     /// When `gradient` is shorter than the parameters.
     pub fn add_gradient(&self, pass: &Pass, rows: Range<usize>, gradient: &mut [f32]) {
+        blocks(rows).for_each(|block| self.add_gradient_block(pass, block, gradient));
+    }
+
+    fn add_gradient_block(&self, pass: &Pass, rows: Range<usize>, gradient: &mut [f32]) {
         for layer in 0..self.layers() {
             let shape = self.shape(layer, &rows);
             let (weights, biases) = self.layer_ranges(layer);
