@@ -28,8 +28,8 @@ impl Descent {
 }
 
 /// The dynamics network with what its fine-tuning and the rollouts through it need.
-struct Model {
-    dynamics: Dynamics,
+pub(super) struct Model {
+    pub(super) dynamics: Dynamics,
     samples: Samples,
     held_out: Samples,
     adam: Adam,
@@ -45,12 +45,12 @@ pub struct Learner {
     pub(super) updates: u64,
     skipped: u64,
     settings: TrainSettings,
-    policy: Policy,
+    pub(super) policy: Policy,
     averaged: Policy,
     samples: Samples,
     held_out: Corpus,
     held_out_samples: Samples,
-    model: Option<Model>,
+    pub(super) model: Option<Model>,
     net_descent: Descent,
     std_descent: Descent,
     bc_choices: bc::Choices,
@@ -142,24 +142,6 @@ impl Learner {
     /// Transitions of some training demos, one after another.
     pub fn rows_of(&self, demos: &[usize]) -> Vec<usize> {
         self.corpus.rows_of(demos)
-    }
-
-    /// Floating point operations of the matrix products of one update of behavior cloning alone on `rows` transitions.
-    pub fn bc_flops_per_update(&self, rows: u64) -> u64 {
-        let net = &self.policy.net;
-        // forward, weights' gradient, and inputs' gradient, which the first layer does not need
-        rows * (3 * net.flops_per_row() - net.first_layer_flops_per_row())
-    }
-
-    /// Floating point operations of the matrix products of one update of Algorithm 1 on `rows` transitions in `segments` segments.
-    pub fn flops_per_update(&self, rows: u64, segments: u64) -> u64 {
-        let later = 3 * self.policy.net.flops_per_row() * (rows - segments);
-        let model = self.model.as_ref().map_or(0, |model| {
-            let net = &model.dynamics.net;
-            // rollout: forward and inputs' gradient; fine-tuning: as behavior cloning
-            rows * (5 * net.flops_per_row() - net.first_layer_flops_per_row())
-        });
-        self.bc_flops_per_update(rows) + later + model
     }
 
     /// Segments of the last [`Learner::state_cloning`].

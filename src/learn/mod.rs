@@ -2,6 +2,7 @@
 
 pub mod behavior_cloning;
 mod corpus;
+mod cost;
 mod dynamics;
 mod features;
 #[cfg(test)]
