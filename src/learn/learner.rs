@@ -3,10 +3,9 @@
 use super::behavior_cloning::{self as bc, Cloned, draw_noise, policy_gradient};
 use super::corpus::{Corpus, Samples};
 use super::dynamics::Dynamics;
+use super::fine_tuning::Model;
 use super::metrics::{EpochMetrics, action_errors};
 use super::policy::Policy;
-use super::pretrain_dynamics::{model_loss, validation_loss};
-use super::regression::Regression;
 use super::shards::add_scaled;
 use super::state_cloning::{self as sc, Segment, draw_segments};
 use crate::config::{ActionChoice, TrainSettings};
@@ -25,15 +24,6 @@ impl Descent {
     fn new(params: &[f32], ema_decay: f64) -> Self {
         Descent { adam: Adam::new(params.len()), ema: Ema::new(params, ema_decay) }
     }
-}
-
-/// The dynamics network with what its fine-tuning and the rollouts through it need.
-pub(super) struct Model {
-    pub(super) dynamics: Dynamics,
-    samples: Samples,
-    held_out: Samples,
-    adam: Adam,
-    work: Regression,
 }
 
 /// A policy under training. One update of Algorithm 1 is [`Learner::behavior_cloning`], [`Learner::state_cloning`],
@@ -88,13 +78,7 @@ impl Learner {
             )));
         }
         let policy = Policy::new(&corpus, settings, &mut stream(seed, "train.init", 0));
-        let model = dynamics.map(|dynamics| Model {
-            samples: corpus.model_samples(&dynamics),
-            held_out: held_out.model_samples(&dynamics),
-            adam: Adam::new(dynamics.net.params().len()),
-            work: Regression::default(),
-            dynamics,
-        });
+        let model = dynamics.map(|dynamics| Model::new(dynamics, &corpus, &held_out));
         Ok(Learner {
             seed,
             updates: 0,
@@ -241,14 +225,11 @@ impl Learner {
     /// # Errors
     /// [`Error::Failed`] when the loss is not a number.
     pub fn fine_tune(&mut self, rows: &[usize]) -> Result<f64> {
-        let mean_length = self.mean_length() as f32;
-        let Some(Model { dynamics, samples, adam, work, .. }) = &mut self.model else {
+        let (mean_length, learning_rate) = (self.mean_length() as f32, self.settings.dynamics_learning_rate);
+        let Some(model) = &mut self.model else {
             return Ok(f64::NAN);
         };
-        let loss = model_loss(dynamics, rows.len(), mean_length);
-        let l_model = work.loss(&dynamics.net, samples, rows, &loss, true);
-        clip_by_global_norm(&mut work.gradient, dynamics.settings().clip_norm);
-        adam.step(dynamics.net.params_mut(), &work.gradient, self.settings.dynamics_learning_rate);
+        let l_model = model.fine_tune(rows, mean_length, learning_rate);
         self.finite("the loss of the dynamics network (Eq. 6)", l_model, "lower train.dynamics_learning_rate")?;
         Ok(l_model)
     }
@@ -266,7 +247,7 @@ impl Learner {
         let scaling = self.averaged.action_scaling();
         metrics.errors = action_errors(&self.held_out_samples, &work.mean, &scaling.std, &scaling.mean);
         if let Some(model) = &mut self.model {
-            metrics.validation_l_model = validation_loss(&model.dynamics, &self.held_out, &model.held_out, &mut model.work);
+            metrics.validation_l_model = model.validation_loss(&self.held_out);
         }
         (metrics.updates, metrics.skipped) = (self.updates, self.skipped);
         metrics

@@ -5,6 +5,7 @@ mod corpus;
 mod cost;
 mod dynamics;
 mod features;
+mod fine_tuning;
 #[cfg(test)]
 mod gradient_tests;
 mod hand;
