@@ -147,7 +147,7 @@ impl Default for TrainSettings {
             alpha: Alpha::Adaptive,
             alpha_max: 1.0,
             alpha_average: true,
-            rho: 0.6,
+            rho: 0.3,
             sc_scale: StateScale::Step,
             sc_pairs: Pairs::BeforeRecovery,
             fine_tune_dynamics: true,

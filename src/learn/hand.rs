@@ -47,10 +47,10 @@ impl Chain {
     pub fn hand(&self, q: &[f32]) -> Hand {
         let mut hand = Hand { columns: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]], ..Hand::default() };
         let mut position = [0.0; 3];
-        for i in 0..ARM_JOINTS {
+        for (i, angle) in q[..ARM_JOINTS].iter().enumerate() {
             position = add(position, turn(&hand.columns, self.offsets[i]));
             let [x, y, z] = self.rotations[i].map(|column| turn(&hand.columns, column));
-            let (sin, cos) = sin_cos(q[i]);
+            let (sin, cos) = sin_cos(*angle);
             hand.columns = [add(scale(x, cos), scale(y, sin)), add(scale(y, cos), scale(x, -sin)), z];
             hand.axes[i] = z;
             hand.origins[i] = position;
@@ -64,9 +64,9 @@ impl Hand {
     /// Adds to `d_q` the gradient that reaches the joints when a force `f` pulls at the tool point and a moment `m` turns the hand:
     /// joint i gets z_i . ((p - o_i) x f + m).
     pub fn add_joint_gradient(&self, f: Vec3, m: Vec3, d_q: &mut [f32]) {
-        for i in 0..ARM_JOINTS {
+        for (i, d) in d_q[..ARM_JOINTS].iter_mut().enumerate() {
             let lever = sub(self.tool, self.origins[i]);
-            d_q[i] += dot(self.axes[i], add(cross(lever, f), m));
+            *d += dot(self.axes[i], add(cross(lever, f), m));
         }
     }
 }

@@ -3,10 +3,9 @@
 use super::behavior_cloning::{self as bc, Cloned, draw_noise, policy_gradient};
 use super::corpus::{Corpus, Samples};
 use super::dynamics::Dynamics;
+use super::fine_tuning::Model;
 use super::metrics::{EpochMetrics, action_errors};
 use super::policy::Policy;
-use super::pretrain_dynamics::{model_loss, validation_loss};
-use super::regression::Regression;
 use super::shards::add_scaled;
 use super::state_cloning::{self as sc, Segment, draw_segments};
 use crate::config::{ActionChoice, TrainSettings};
@@ -27,15 +26,6 @@ impl Descent {
     }
 }
 
-/// The dynamics network with what its fine-tuning and the rollouts through it need.
-struct Model {
-    dynamics: Dynamics,
-    samples: Samples,
-    held_out: Samples,
-    adam: Adam,
-    work: Regression,
-}
-
 /// A policy under training. One update of Algorithm 1 is [`Learner::behavior_cloning`], [`Learner::state_cloning`],
 /// [`Learner::update`] and [`Learner::fine_tune`] on the same demos.
 pub struct Learner {
@@ -45,12 +35,12 @@ pub struct Learner {
     pub(super) updates: u64,
     skipped: u64,
     settings: TrainSettings,
-    policy: Policy,
+    pub(super) policy: Policy,
     averaged: Policy,
     samples: Samples,
     held_out: Corpus,
     held_out_samples: Samples,
-    model: Option<Model>,
+    pub(super) model: Option<Model>,
     net_descent: Descent,
     std_descent: Descent,
     bc_choices: bc::Choices,
@@ -88,13 +78,7 @@ impl Learner {
             )));
         }
         let policy = Policy::new(&corpus, settings, &mut stream(seed, "train.init", 0));
-        let model = dynamics.map(|dynamics| Model {
-            samples: corpus.model_samples(&dynamics),
-            held_out: held_out.model_samples(&dynamics),
-            adam: Adam::new(dynamics.net.params().len()),
-            work: Regression::default(),
-            dynamics,
-        });
+        let model = dynamics.map(|dynamics| Model::new(dynamics, &corpus, &held_out));
         Ok(Learner {
             seed,
             updates: 0,
@@ -142,24 +126,6 @@ impl Learner {
     /// Transitions of some training demos, one after another.
     pub fn rows_of(&self, demos: &[usize]) -> Vec<usize> {
         self.corpus.rows_of(demos)
-    }
-
-    /// Floating point operations of the matrix products of one update of behavior cloning alone on `rows` transitions.
-    pub fn bc_flops_per_update(&self, rows: u64) -> u64 {
-        let net = &self.policy.net;
-        // forward, weights' gradient, and inputs' gradient, which the first layer does not need
-        rows * (3 * net.flops_per_row() - net.first_layer_flops_per_row())
-    }
-
-    /// Floating point operations of the matrix products of one update of Algorithm 1 on `rows` transitions in `segments` segments.
-    pub fn flops_per_update(&self, rows: u64, segments: u64) -> u64 {
-        let later = 3 * self.policy.net.flops_per_row() * (rows - segments);
-        let model = self.model.as_ref().map_or(0, |model| {
-            let net = &model.dynamics.net;
-            // rollout: forward and inputs' gradient; fine-tuning: as behavior cloning
-            rows * (5 * net.flops_per_row() - net.first_layer_flops_per_row())
-        });
-        self.bc_flops_per_update(rows) + later + model
     }
 
     /// Segments of the last [`Learner::state_cloning`].
@@ -259,14 +225,11 @@ impl Learner {
     /// # Errors
     /// [`Error::Failed`] when the loss is not a number.
     pub fn fine_tune(&mut self, rows: &[usize]) -> Result<f64> {
-        let mean_length = self.mean_length() as f32;
-        let Some(Model { dynamics, samples, adam, work, .. }) = &mut self.model else {
+        let (mean_length, learning_rate) = (self.mean_length() as f32, self.settings.dynamics_learning_rate);
+        let Some(model) = &mut self.model else {
             return Ok(f64::NAN);
         };
-        let loss = model_loss(dynamics, rows.len(), mean_length);
-        let l_model = work.loss(&dynamics.net, samples, rows, &loss, true);
-        clip_by_global_norm(&mut work.gradient, dynamics.settings().clip_norm);
-        adam.step(dynamics.net.params_mut(), &work.gradient, self.settings.dynamics_learning_rate);
+        let l_model = model.fine_tune(rows, mean_length, learning_rate);
         self.finite("the loss of the dynamics network (Eq. 6)", l_model, "lower train.dynamics_learning_rate")?;
         Ok(l_model)
     }
@@ -284,7 +247,7 @@ impl Learner {
         let scaling = self.averaged.action_scaling();
         metrics.errors = action_errors(&self.held_out_samples, &work.mean, &scaling.std, &scaling.mean);
         if let Some(model) = &mut self.model {
-            metrics.validation_l_model = validation_loss(&model.dynamics, &self.held_out, &model.held_out, &mut model.work);
+            metrics.validation_l_model = model.validation_loss(&self.held_out);
         }
         (metrics.updates, metrics.skipped) = (self.updates, self.skipped);
         metrics

@@ -2,8 +2,10 @@
 
 pub mod behavior_cloning;
 mod corpus;
+mod cost;
 mod dynamics;
 mod features;
+mod fine_tuning;
 #[cfg(test)]
 mod gradient_tests;
 mod hand;

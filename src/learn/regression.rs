@@ -65,10 +65,9 @@ impl Shard {
         net.forward(&mut self.pass, 0..rows.len());
         self.loss = 0.0;
         for (slot, r) in rows.iter().enumerate() {
-            let target = row(&samples.targets, outputs, *r);
             let mut sum = 0.0f32;
-            for i in 0..outputs {
-                let error = self.pass.output[slot * outputs + i] - target[i];
+            for (i, target) in row(&samples.targets, outputs, *r).iter().enumerate() {
+                let error = self.pass.output[slot * outputs + i] - target;
                 let (value, slope) = if loss.huber && error.abs() > HUBER_KNEE {
                     (HUBER_KNEE * (2.0 * error.abs() - HUBER_KNEE), 2.0 * HUBER_KNEE * error.signum())
                 } else {

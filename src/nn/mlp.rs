@@ -1,5 +1,6 @@
 //! A multilayer perceptron with a linear head; each backward stands under its forward.
 
+use super::Pass;
 use super::activation::Activation;
 use super::matmul::{Shape, add_forward, add_weight_gradient, input_gradient};
 use rand::{Rng, RngExt};
@@ -13,52 +14,12 @@ pub struct Mlp {
     params: Vec<f32>,
 }
 
-/// Activations and their gradients for up to `capacity` rows: the workspace of one thread.
-#[derive(Clone, Debug, Default)]
-pub struct Pass {
-    /// Inputs, rows x widths\[0\].
-    pub input: Vec<f32>,
-    /// Outputs, rows x widths\[last\].
-    pub output: Vec<f32>,
-    /// Gradient of the loss with respect to the outputs, to be set before [`Mlp::backward`].
-    pub d_output: Vec<f32>,
-    /// Gradient with respect to the inputs, set by [`Mlp::backward_input`].
-    pub d_input: Vec<f32>,
-    hidden: Vec<Vec<f32>>,
-    d_hidden: Vec<Vec<f32>>,
-    capacity: usize,
-}
+/// Rows that go through all layers before the next rows do, so that their activations stay in the processor's cache.
+const BLOCK_ROWS: usize = 128;
 
-impl Pass {
-    /// A workspace for `rows` rows of `mlp`.
-    pub fn new(mlp: &Mlp, rows: usize) -> Self {
-        let mut pass = Pass::default();
-        pass.reserve(mlp, rows);
-        pass
-    }
-
-    /// Makes room for `rows` rows; keeps what is there and never shrinks.
-    pub fn reserve(&mut self, mlp: &Mlp, rows: usize) {
-        if rows <= self.capacity && !self.hidden.is_empty() {
-            return;
-        }
-        let hidden = &mlp.widths[1..mlp.widths.len() - 1];
-        self.hidden.resize(hidden.len(), Vec::new());
-        self.d_hidden.resize(hidden.len(), Vec::new());
-        for (i, width) in hidden.iter().enumerate() {
-            self.hidden[i].resize(rows * width, 0.0);
-            self.d_hidden[i].resize(rows * width, 0.0);
-        }
-        for (array, width) in [
-            (&mut self.input, mlp.inputs()),
-            (&mut self.d_input, mlp.inputs()),
-            (&mut self.output, mlp.outputs()),
-            (&mut self.d_output, mlp.outputs()),
-        ] {
-            array.resize(rows * width, 0.0);
-        }
-        self.capacity = rows;
-    }
+fn blocks(rows: Range<usize>) -> impl Iterator<Item = Range<usize>> {
+    let end = rows.end;
+    rows.step_by(BLOCK_ROWS).map(move |from| from..end.min(from + BLOCK_ROWS))
 }
 
 impl Mlp {
@@ -143,6 +104,10 @@ impl Mlp {
 
     /// `pass.output` of `rows` from `pass.input`.
     pub fn forward(&self, pass: &mut Pass, rows: Range<usize>) {
+        blocks(rows).for_each(|block| self.forward_block(pass, block));
+    }
+
+    fn forward_block(&self, pass: &mut Pass, rows: Range<usize>) {
         for layer in 0..self.layers() {
             let shape = self.shape(layer, &rows);
             let (weights, biases) = self.layer_ranges(layer);
@@ -160,6 +125,10 @@ impl Mlp {
 
     /// Gradients of the hidden layers of `rows` from `pass.d_output`; they stay in the workspace for the two calls below.
     pub fn backward(&self, pass: &mut Pass, rows: Range<usize>) {
+        blocks(rows).for_each(|block| self.backward_block(pass, block));
+    }
+
+    fn backward_block(&self, pass: &mut Pass, rows: Range<usize>) {
         for layer in (1..self.layers()).rev() {
             let shape = self.shape(layer, &rows);
             let (weights, _) = self.layer_ranges(layer);
@@ -184,6 +153,10 @@ impl Mlp {
     /// # Panics
     /// When `gradient` is shorter than the parameters.
     pub fn add_gradient(&self, pass: &Pass, rows: Range<usize>, gradient: &mut [f32]) {
+        blocks(rows).for_each(|block| self.add_gradient_block(pass, block, gradient));
+    }
+
+    fn add_gradient_block(&self, pass: &Pass, rows: Range<usize>, gradient: &mut [f32]) {
         for layer in 0..self.layers() {
             let shape = self.shape(layer, &rows);
             let (weights, biases) = self.layer_ranges(layer);

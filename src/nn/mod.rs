@@ -9,7 +9,9 @@ pub mod adam;
 pub mod gaussian;
 pub mod matmul;
 pub mod mlp;
+mod pass;
 
 pub use activation::Activation;
 pub use adam::{Adam, Ema, clip_by_global_norm, cosine, global_norm};
-pub use mlp::{Mlp, Pass};
+pub use mlp::Mlp;
+pub use pass::Pass;

@@ -1,0 +1,46 @@
+//! The dynamics network during Algorithm 1: rollouts pass through it, and it keeps learning from observed transitions (Eq. 6).
+
+use super::corpus::{Corpus, Samples};
+use super::dynamics::Dynamics;
+use super::pretrain_dynamics::{model_loss, validation_loss};
+use super::regression::Regression;
+use crate::nn::{Adam, clip_by_global_norm};
+
+/// f_phi with what rollouts through it and its fine-tuning need.
+pub struct Model {
+    /// f_phi.
+    pub dynamics: Dynamics,
+    /// Its inputs and targets on the training demos.
+    pub samples: Samples,
+    held_out: Samples,
+    adam: Adam,
+    work: Regression,
+}
+
+impl Model {
+    /// A pretrained network on these demos.
+    pub fn new(dynamics: Dynamics, corpus: &Corpus, held_out: &Corpus) -> Self {
+        Model {
+            samples: corpus.model_samples(&dynamics),
+            held_out: held_out.model_samples(&dynamics),
+            adam: Adam::new(dynamics.net.params().len()),
+            work: Regression::default(),
+            dynamics,
+        }
+    }
+
+    /// One update on transitions `rows` of the training demos; returns the loss before it.
+    pub fn fine_tune(&mut self, rows: &[usize], mean_length: f32, learning_rate: f64) -> f64 {
+        let Model { dynamics, samples, adam, work, .. } = self;
+        let loss = model_loss(dynamics, rows.len(), mean_length);
+        let l_model = work.loss(&dynamics.net, samples, rows, &loss, true);
+        clip_by_global_norm(&mut work.gradient, dynamics.settings().clip_norm);
+        adam.step(dynamics.net.params_mut(), &work.gradient, learning_rate);
+        l_model
+    }
+
+    /// Loss on the validation demos.
+    pub fn validation_loss(&mut self, held_out: &Corpus) -> f64 {
+        validation_loss(&self.dynamics, held_out, &self.held_out, &mut self.work)
+    }
+}
