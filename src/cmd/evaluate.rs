@@ -45,14 +45,16 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome> {
     let path = path_or(args.policy.as_deref(), pipeline.task, "policy.safetensors");
     let by_planner = path == Path::new(PLANNER);
 
-    let (trials, inputs): (_, Vec<(&str, &Path)>) = if by_planner {
+    let (rollouts, inputs): (_, Vec<(&str, &Path)>) = if by_planner {
         (planner(args, &pipeline, context)?, vec![])
     } else {
         (policy(args, &path, &pipeline, context)?, vec![("policy", &path)])
     };
+    let (horizon_steps, trials) = rollouts;
     let summary = Summary::of(pipeline.task, &trials);
     if let Some(out) = &args.out {
         let mut provenance = args.settings.provenance(Stage::Evaluate, &pipeline, &inputs)?;
+        provenance.settings["evaluate"]["horizon_steps"] = horizon_steps.into();
         provenance.settings["policy"] = if by_planner { PLANNER } else { train::KIND }.into();
         let value = serde_json::to_value(&summary).map_err(|e| Error::Failed(format!("cannot write JSON: {e}")))?;
         table_file::write(&out.with_extension("parquet"), &to_table(pipeline.task, &trials), &provenance)?;
@@ -61,12 +63,15 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome> {
     if args.json {
         output::print_json(&summary)?
     } else {
-        output::print(&words(&summary))?
+        output::print(&words(&summary, &trials))?
     }
     Ok(Outcome::Done)
 }
 
-fn planner(args: &Args, pipeline: &Pipeline, context: &Context) -> Result<Vec<Trial>> {
+/// The horizon in control steps, and how each episode went.
+type Rolled = (u32, Vec<Trial>);
+
+fn planner(args: &Args, pipeline: &Pipeline, context: &Context) -> Result<Rolled> {
     let horizon_steps = match pipeline.evaluate.horizon_steps {
         0 => pipeline.simulate.max_steps,
         given => given,
@@ -78,7 +83,7 @@ fn planner(args: &Args, pipeline: &Pipeline, context: &Context) -> Result<Vec<Tr
     })
 }
 
-fn policy(args: &Args, path: &Path, pipeline: &Pipeline, context: &Context) -> Result<Vec<Trial>> {
+fn policy(args: &Args, path: &Path, pipeline: &Pipeline, context: &Context) -> Result<Rolled> {
     let (tensors, meta, made) = weights::read(path, train::KIND)?;
     same_task(path, made.task, pipeline.task)?;
     let policy = Arc::new(Policy::from_tensors(&tensors, &meta).map_err(|why| Error::input(path, why))?);
@@ -92,7 +97,7 @@ fn policy(args: &Args, path: &Path, pipeline: &Pipeline, context: &Context) -> R
     })
 }
 
-fn rollouts<F>(args: &Args, pipeline: &Pipeline, horizon_steps: u32, context: &Context, make: F) -> Result<Vec<Trial>>
+fn rollouts<F>(args: &Args, pipeline: &Pipeline, horizon_steps: u32, context: &Context, make: F) -> Result<Rolled>
 where
     F: Fn(u64, &Scene) -> Result<Option<Box<dyn Controller>>> + Sync,
 {
@@ -101,11 +106,11 @@ where
         Rollouts { pipeline, seed: args.settings.seed, horizon_steps }.run(make, &context.interrupt, |_| progress.step())?;
     let steps: u64 = trials.iter().map(|t| t.steps).sum();
     progress.finish(&format!(", {steps} control steps, horizon {horizon_steps}"));
-    Ok(trials)
+    Ok((horizon_steps, trials))
 }
 
 /// The table for people.
-fn words(summary: &Summary) -> String {
+fn words(summary: &Summary, trials: &[Trial]) -> String {
     let share = |n: u64| format!("{:.1} %", 100.0 * n as f64 / summary.episodes.max(1) as f64);
     let row = |name: &str, n: u64| vec![name.to_string(), n.to_string(), share(n)];
     let [low, high] = summary.wilson_95.map(|v| 100.0 * v);
@@ -113,6 +118,9 @@ fn words(summary: &Summary) -> String {
     rows.extend(summary.task.condition_names().iter().map(|name| row(&format!("  {name}"), summary.conditions[*name])));
     rows.push(row("failed", summary.episodes - summary.successes));
     rows.extend(summary.failures.iter().filter(|(_, n)| **n > 0).map(|(class, n)| row(&format!("  {class}"), *n)));
+    if trials.iter().any(|t| !t.scene.obstacles.is_empty()) {
+        rows.push(row("hit an obstacle", trials.iter().filter(|t| t.hit_obstacle).count() as u64));
+    }
     format!(
         "{}{}: success {} of {} (95 % interval {low:.1} to {high:.1} %), steps p50 {} p95 {}\n",
         text_table(&["at the end", "episodes", "share"], &rows),
