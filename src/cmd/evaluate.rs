@@ -1,7 +1,7 @@
 use super::common::{SettingsArgs, path_or, same_task};
 use super::{Context, Outcome, output, train};
 use crate::config::{Pipeline, Stage};
-use crate::data::{json_file, table_file, weights};
+use crate::data::{atomic, json_file, table_file, weights};
 use crate::error::{Error, Result};
 use crate::eval::{PolicyController, Rollouts, Summary, Trial, to_table};
 use crate::learn::Policy;
@@ -55,8 +55,9 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome> {
         let mut provenance = args.settings.provenance(Stage::Evaluate, &pipeline, &inputs)?;
         provenance.settings["policy"] = if by_planner { PLANNER } else { train::KIND }.into();
         let value = serde_json::to_value(&summary).map_err(|e| Error::Failed(format!("cannot write JSON: {e}")))?;
-        table_file::write(&out.with_extension("parquet"), &to_table(pipeline.task, &trials), &provenance)?;
-        json_file::write(out, &value, &provenance)?;
+        let log = out.with_extension("parquet");
+        let table = table_file::encode(&log, &to_table(pipeline.task, &trials), &provenance)?;
+        atomic::write_all(&[(log, table), (out.clone(), json_file::encode(out, &value, &provenance)?)])?;
     }
     if args.json {
         output::print_json(&summary)?
@@ -96,6 +97,9 @@ fn rollouts<F>(args: &Args, pipeline: &Pipeline, horizon_steps: u32, context: &C
 where
     F: Fn(u64, &Scene) -> Result<Option<Box<dyn Controller>>> + Sync,
 {
+    if let Some(out) = &args.out {
+        [out, &out.with_extension("parquet")].into_iter().try_for_each(|path| atomic::check_place(path))?;
+    }
     let progress = context.console.progress("evaluate", pipeline.evaluate.episodes, "episodes");
     let trials =
         Rollouts { pipeline, seed: args.settings.seed, horizon_steps }.run(make, &context.interrupt, |_| progress.step())?;

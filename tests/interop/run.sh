@@ -1,6 +1,6 @@
 #!/bin/sh
 # Reads finished runs with other people's programs. Usage: tests/interop/run.sh RUNS   (RUNS holds TASK/recordings, TASK/dataset, ...)
-# PYTHON names a Python 3.12; without it python3.12 on the PATH, then pyenv's. The packages (1 to 2 GB with torch) go to
+# PYTHON names a Python 3.12; without it python3.12 on the PATH, then pyenv's. The packages (6 GB, most of it torch) go to
 # target/interop, once.
 set -eu
 [ $# -eq 1 ] || { echo "usage: $0 RUNS" >&2; exit 2; }
