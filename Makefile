@@ -102,8 +102,9 @@ check: need-cargo ## what CI runs: format, lints, documentation, tests
 	RUSTDOCFLAGS="-D warnings" cargo doc --release --locked --no-deps
 	cargo test --release --locked
 
-interop: build ## read a run's files with mcap, pyarrow, DuckDB, pandas, LeRobot and safetensors (needs Python)
-	tests/interop/run.sh $(HILT)
+interop: build ## tiny runs of all tasks, read by mcap, pyarrow, DuckDB, pandas, LeRobot and safetensors (needs Python 3.12)
+	for task in $(TASKS); do $(MAKE) --no-print-directory all TASK=$$task RUNS=$(RUNS)/smoke SET="$(SMOKE)"; done
+	tests/interop/run.sh $(RUNS)/smoke
 
 bench: need-cargo ## measure planner, simulator and training
 	cargo bench --locked

@@ -9,7 +9,12 @@ use std::sync::atomic::{AtomicBool, Ordering};
 pub struct Interrupt(Arc<AtomicBool>);
 
 impl Interrupt {
-    /// Raise the flag (called by the signal handler).
+    /// The flag itself, for a signal handler to set.
+    pub fn flag(&self) -> Arc<AtomicBool> {
+        Arc::clone(&self.0)
+    }
+
+    /// Raise the flag.
     pub fn raise(&self) {
         self.0.store(true, Ordering::SeqCst);
     }

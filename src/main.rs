@@ -3,31 +3,42 @@
 use clap::Parser;
 use hilt::cmd::{Cli, Outcome};
 use hilt::interrupt::Interrupt;
+use signal_hook::consts::{SIGINT, SIGTERM, SIGXFSZ};
+use signal_hook::flag;
 use std::io::Write;
 use std::process::ExitCode;
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
 
 /// Exit code of a process that Ctrl-C ended: 128 + SIGINT.
 const INTERRUPTED: i32 = 130;
 
+/// Ctrl-C, and what `kill`, `timeout` and batch systems send. A hang-up keeps its meaning, so that `nohup` works.
+const INTERRUPTS: [i32; 2] = [SIGINT, SIGTERM];
+
 fn main() -> ExitCode {
     let cli = Cli::parse();
     let interrupt = Interrupt::default();
-    let raised = interrupt.clone();
-    let handler = ctrlc::set_handler(move || {
-        if raised.is_raised() {
-            // The second Ctrl-C does not wait for the loops to notice the first.
-            std::process::exit(INTERRUPTED);
-        }
-        raised.raise();
-    });
-    if let Err(e) = handler {
-        return fail(&format!("cannot listen for Ctrl-C: {e}"), 1);
+    if let Err(e) = listen(&interrupt) {
+        return fail(&format!("cannot listen for signals: {e}"), 1);
     }
     match cli.run(interrupt) {
         Ok(Outcome::Done) => ExitCode::SUCCESS,
         Ok(Outcome::Dropped(_)) => ExitCode::from(Outcome::DROPPED_CODE),
         Err(e) => fail(&e.to_string(), e.exit_code()),
     }
+}
+
+/// The first signal asks the loops to stop, the second does not wait for them. A file-size limit is an error of `write`, not the
+/// process's end.
+fn listen(interrupt: &Interrupt) -> std::io::Result<()> {
+    for signal in INTERRUPTS {
+        // In this order: the first signal finds the flag down.
+        flag::register_conditional_shutdown(signal, INTERRUPTED, interrupt.flag())?;
+        flag::register(signal, interrupt.flag())?;
+    }
+    flag::register(SIGXFSZ, Arc::<AtomicBool>::default())?;
+    Ok(())
 }
 
 fn fail(message: &str, code: u8) -> ExitCode {

@@ -68,8 +68,7 @@ fn check_phases(plan: &Plan) {
 fn check_limits(plan: &Plan, limits: &Limits) {
     let w = &plan.waypoints;
     let rest = [w[0]].into_iter().chain(w.iter().copied()).chain([w[w.len() - 1]]).collect::<Vec<_>>();
-    for j in 0..JOINTS {
-        let [low, high] = POSITION_LIMITS_RAD[j];
+    for (j, [low, high]) in POSITION_LIMITS_RAD.into_iter().enumerate() {
         let (v, a) = (limits.velocity_rad_s[j] + ROUNDING, limits.acceleration_rad_s2[j] + ROUNDING);
         for around in rest.windows(3) {
             let [before, now, after] = [around[0].q_rad[j], around[1].q_rad[j], around[2].q_rad[j]];

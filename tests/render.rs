@@ -1,6 +1,7 @@
 //! Pictures of a hand-made episode.
 
 use hilt::demo::{Contacts, Episode, Phase, Step};
+use hilt::interrupt::Interrupt;
 use hilt::report::render::{GifOptions, RgbImage, frame, write_gif, write_png_sheet};
 use hilt::robot::{Arm, READY_Q_RAD};
 use hilt::scene::{Obstacle, Scene};
@@ -106,7 +107,7 @@ fn an_animation_decodes_back_to_its_pictures_and_is_deterministic() {
     let options = GifOptions { width: 160, height: 120, every_n_steps: 4, fps: 10 };
     let write = || {
         let mut bytes = Vec::new();
-        write_gif(&e, &options, &mut bytes).unwrap();
+        write_gif(&e, &options, &Interrupt::default(), &mut bytes).unwrap();
         bytes
     };
     let bytes = write();
@@ -138,7 +139,7 @@ fn a_sheet_decodes_back_and_is_deterministic() {
     let e = episode(Task::PickAndPlace, 12);
     let write = || {
         let mut bytes = Vec::new();
-        write_png_sheet(&e, 3, 2, (160, 120), &mut bytes).unwrap();
+        write_png_sheet(&e, (3, 2), (160, 120), &Interrupt::default(), &mut bytes).unwrap();
         bytes
     };
     let bytes = write();
@@ -158,10 +159,12 @@ fn a_sheet_decodes_back_and_is_deterministic() {
 fn impossible_sizes_are_refused() {
     let e = episode(Task::PickUp, 2);
     let bad = GifOptions { width: 0, ..GifOptions::default() };
-    assert!(write_gif(&e, &bad, Vec::new()).unwrap_err().to_string().contains("0 x 360"));
+    assert!(write_gif(&e, &bad, &Interrupt::default(), Vec::new()).unwrap_err().to_string().contains("0 x 360"));
     let bad = GifOptions { every_n_steps: 0, ..GifOptions::default() };
-    assert!(write_gif(&e, &bad, Vec::new()).is_err());
-    assert!(write_png_sheet(&e, 0, 2, (160, 120), Vec::new()).is_err());
+    assert!(write_gif(&e, &bad, &Interrupt::default(), Vec::new()).is_err());
+    assert!(write_png_sheet(&e, (0, 2), (160, 120), &Interrupt::default(), Vec::new()).is_err());
+    let huge = write_png_sheet(&e, (32, 32), (4096, 4096), &Interrupt::default(), Vec::new()).unwrap_err().to_string();
+    assert!(huge.contains("at most 100000000"), "{huge}");
 }
 
 /// For looking at: `HILT_PICTURES=directory cargo test --release --test render -- --ignored`.
@@ -172,9 +175,9 @@ fn pictures_to_look_at() {
     for task in Task::ALL {
         let e = episode(task, 80);
         let file = |ending: &str| std::fs::File::create(directory.join(format!("{task}.{ending}"))).unwrap();
-        write_png_sheet(&e, 2, 2, SIZE, file("png")).unwrap();
+        write_png_sheet(&e, (2, 2), SIZE, &Interrupt::default(), file("png")).unwrap();
         let start = std::time::Instant::now();
-        write_gif(&e, &GifOptions::default(), file("gif")).unwrap();
+        write_gif(&e, &GifOptions::default(), &Interrupt::default(), file("gif")).unwrap();
         let whole = start.elapsed();
         let start = std::time::Instant::now();
         (0..20).for_each(|i| drop(frame(&e, 4 * i, SIZE)));

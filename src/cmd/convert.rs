@@ -21,6 +21,9 @@ pub struct Args {
     out: Option<PathBuf>,
 }
 
+/// For when no episode succeeded.
+const ADVICE: &str = "record again with less noise (simulate.noise_variance), or keep them with convert.keep_failed=true";
+
 pub fn run(args: &Args, context: &Context) -> Result<Outcome> {
     let pipeline = args.settings.resolve(&[])?;
     let dir = path_or(args.recordings.as_deref(), pipeline.task, "recordings");
@@ -38,13 +41,13 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome> {
         })
         .collect::<Result<_>>()?;
     progress.finish("");
-    let (kept, outcome) = dropped::keep("convert", read, &context.console)?;
+    let (kept, outcome) = dropped::keep("convert", read, ADVICE, &context.console)?;
 
     let (train, validation) = dataset::split(kept.len(), pipeline.convert.train_per_validation, args.settings.seed);
     let pick =
         |indices: &[usize]| -> Vec<_> { indices.iter().map(|i| dataset::DatasetEpisode::of(&kept[*i].0, &kept[*i].1)).collect() };
     let provenance = args.settings.provenance(Stage::Convert, &pipeline, &[("recordings", &dir)])?;
-    dataset::write_split(&out, pipeline.task, &pick(&train), &pick(&validation), &provenance)?;
+    dataset::write_split(&out, pipeline.task, &pick(&train), &pick(&validation), &provenance, &context.interrupt)?;
     let (to, t, v) = (out.display(), train.len(), validation.len());
     context.console.say(&format!("convert: wrote {to}: {t} training and {v} validation episodes"));
     Ok(outcome)

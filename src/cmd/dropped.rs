@@ -9,11 +9,11 @@ const NAMED: usize = 20;
 /// An item, or why it was dropped ("episode 3: ...").
 pub type Kept<T> = std::result::Result<T, String>;
 
-/// Keeps what came through and says what did not.
+/// Keeps what came through and says what did not; `advice` is for when that is everything.
 ///
 /// # Errors
 /// [`Error::Failed`] when nothing came through, with the first reason.
-pub fn keep<T>(stage: &str, items: Vec<Kept<T>>, console: &Console) -> Result<(Vec<T>, Outcome)> {
+pub fn keep<T>(stage: &str, items: Vec<Kept<T>>, advice: &str, console: &Console) -> Result<(Vec<T>, Outcome)> {
     let total = items.len();
     let (mut kept, mut reasons) = (Vec::with_capacity(total), Vec::new());
     for item in items {
@@ -26,7 +26,7 @@ pub fn keep<T>(stage: &str, items: Vec<Kept<T>>, console: &Console) -> Result<(V
         return Ok((kept, Outcome::Done));
     };
     if kept.is_empty() {
-        return Err(Error::Failed(format!("{stage}: all {total} episodes were dropped; the first: {first}")));
+        return Err(Error::Failed(format!("{stage}: all {total} episodes were dropped; the first: {first}; {advice}")));
     }
     console.say(&format!("{stage}: dropped {} of {total} episodes:", reasons.len()));
     reasons.iter().take(NAMED).for_each(|reason| console.say(&format!("  {reason}")));

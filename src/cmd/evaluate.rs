@@ -66,6 +66,9 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome> {
     provenance.settings["evaluate"]["horizon_steps"] = horizon_steps.into();
     provenance.settings["policy"] = if inputs.is_empty() { PLANNER } else { train::KIND }.into();
 
+    if let Some(out) = &args.out {
+        [out, &out.with_extension("parquet")].into_iter().try_for_each(|path| atomic::check_place(path))?;
+    }
     let rollouts = Rollouts { pipeline: &pipeline, seed: args.settings.seed, horizon_steps };
     let trials = match &args.record {
         None => run_all(&rollouts, &subject, context, |_| Ok(()))?,
@@ -74,8 +77,9 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome> {
     let summary = Summary::of(pipeline.task, &trials);
     if let Some(out) = &args.out {
         let value = serde_json::to_value(&summary).map_err(|e| Error::Failed(format!("cannot write JSON: {e}")))?;
-        table_file::write(&out.with_extension("parquet"), &to_table(pipeline.task, &trials), &provenance)?;
-        json_file::write(out, &value, &provenance)?;
+        let log = out.with_extension("parquet");
+        let table = table_file::encode(&log, &to_table(pipeline.task, &trials), &provenance)?;
+        atomic::write_all(&[(log, table), (out.clone(), json_file::encode(out, &value, &provenance)?)])?;
     }
     if args.json {
         output::print_json(&summary)?

@@ -1,4 +1,4 @@
-use super::{Outcome, output};
+use super::{Context, Outcome, output};
 use crate::data;
 use crate::error::Result;
 use std::path::PathBuf;
@@ -14,8 +14,8 @@ pub struct Args {
     json: bool,
 }
 
-pub fn run(args: &Args) -> Result<Outcome> {
-    let found = data::inspect(&args.path)?;
+pub fn run(args: &Args, context: &Context) -> Result<Outcome> {
+    let found = data::inspect(&args.path, &context.interrupt)?;
     if args.json {
         output::print_json(&found)?;
     } else {

@@ -105,7 +105,7 @@ impl Cli {
             Command::Pretrain(args) => pretrain::run(args, &context),
             Command::Train(args) => train::run(args, &context),
             Command::Evaluate(args) => evaluate::run(args, &context),
-            Command::Inspect(args) => return inspect::run(args),
+            Command::Inspect(args) => return inspect::run(args, &context),
             Command::Render(args) => render::run(args, &context),
             Command::Settings(args) => return settings::run(args),
         };

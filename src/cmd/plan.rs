@@ -1,7 +1,7 @@
 use super::common::{SettingsArgs, path_or};
 use super::{Context, Outcome, dropped};
 use crate::config::Stage;
-use crate::data::table_file;
+use crate::data::{atomic, table_file};
 use crate::error::Result;
 use crate::plan::{Planner, to_table};
 use crate::seed;
@@ -22,10 +22,14 @@ pub struct Args {
     out: Option<PathBuf>,
 }
 
+/// For when no scene has a plan.
+const ADVICE: &str = "change the scene (scene.spawn_x_m, scene.spawn_y_m, scene.obstacles) or allow more plan.search_iterations";
+
 pub fn run(args: &Args, context: &Context) -> Result<Outcome> {
     let pipeline = args.settings.resolve(&[("plan.episodes", args.episodes.map(|n| n.to_string()))])?;
     let (task, seed) = (pipeline.task, args.settings.seed);
     let out = path_or(args.out.as_deref(), task, "plans.parquet");
+    atomic::check_place(&out)?;
     let provenance = args.settings.provenance(Stage::Plan, &pipeline, &[])?;
 
     let progress = context.console.progress("plan", pipeline.plan.episodes, "plans");
@@ -43,7 +47,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome> {
         )
         .collect::<Result<_>>()?;
     progress.finish("");
-    let (plans, outcome) = dropped::keep("plan", plans, &context.console)?;
+    let (plans, outcome) = dropped::keep("plan", plans, ADVICE, &context.console)?;
     table_file::write(&out, &to_table(&plans), &provenance)?;
     context.console.say(&format!("plan: wrote {}", out.display()));
     Ok(outcome)

@@ -2,7 +2,7 @@ use super::common::{SettingsArgs, path_or};
 use super::epochs::Epochs;
 use super::{Context, Outcome, output};
 use crate::config::Stage;
-use crate::data::{dataset, table_file, weights};
+use crate::data::{atomic, dataset, table_file, weights};
 use crate::demo::Demo;
 use crate::error::Result;
 use crate::learn::{EpochMetrics, pretrain_dynamics};
@@ -31,6 +31,8 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome> {
     let out = path_or(args.out.as_deref(), pipeline.task, "dynamics.safetensors");
     let (train, validation) = demos(&dir, pipeline.task)?;
     let provenance = args.settings.provenance(Stage::Pretrain, &pipeline, &[("dataset", &dir)])?;
+    let (errors, metrics) = (out.with_extension("parquet"), out.with_file_name("pretraining.parquet"));
+    [&errors, &metrics, &out].into_iter().try_for_each(|path| atomic::check_place(path))?;
 
     let mut epochs = Epochs::new(&context.console);
     let seed = args.settings.seed;
@@ -38,9 +40,10 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome> {
     let (dynamics, report) = pretrain_dynamics(&train, &validation, &pipeline.pretrain, seed, &mut log, &context.interrupt)?;
     epochs.finish();
     context.console.say(output::table_text(&report.errors).trim_end());
-    table_file::write(&out.with_extension("parquet"), &report.errors, &provenance)?;
-    table_file::write(&out.with_file_name("pretraining.parquet"), &report.metrics, &provenance)?;
-    weights::write(&out, KIND, &dynamics.to_tensors(), &dynamics.meta(), &provenance)?;
+    let error_table = table_file::encode(&errors, &report.errors, &provenance)?;
+    let metric_table = table_file::encode(&metrics, &report.metrics, &provenance)?;
+    let weights = weights::encode(&out, KIND, &dynamics.to_tensors(), &dynamics.meta(), &provenance)?;
+    atomic::write_all(&[(errors, error_table), (metrics, metric_table), (out.clone(), weights)])?;
     context.console.say(&format!("pretrain: wrote {}", out.display()));
     Ok(Outcome::Done)
 }

@@ -2,7 +2,7 @@ use super::{Context, Outcome};
 use crate::data::{atomic, recording};
 use crate::error::Result;
 use crate::report::render::{GifOptions, write_gif, write_png_sheet};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Draw a recorded episode: an animated GIF, or a contact sheet as PNG.
 #[derive(Debug, clap::Args)]
@@ -30,7 +30,7 @@ pub struct Args {
     /// Contact sheet: rows of pictures
     #[arg(long, value_name = "N", default_value_t = 3)]
     rows: u32,
-    /// File to write [default: the recording's name with .gif or .png]
+    /// File to write [default: in the working directory, the recording's name with .gif or .png]
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
 }
@@ -48,17 +48,19 @@ struct Format {
 
 pub fn run(args: &Args, context: &Context) -> Result<Outcome> {
     let (episode, _) = recording::read(&args.recording)?;
+    let ending = if args.format.gif { "gif" } else { "png" };
+    // Not beside the recording: a directory of recordings is an artefact of its own.
+    let name = || Path::new(args.recording.file_name().unwrap_or_default()).with_extension(ending);
+    let out = args.out.clone().unwrap_or_else(name);
+    atomic::check_place(&out)?;
     let size = (args.width, args.height);
     let mut bytes = Vec::new();
     if args.format.gif {
         let options = GifOptions { width: args.width, height: args.height, every_n_steps: args.every, fps: args.fps };
-        write_gif(&episode, &options, &mut bytes)?;
+        write_gif(&episode, &options, &context.interrupt, &mut bytes)?;
     } else {
-        write_png_sheet(&episode, args.columns, args.rows, size, &mut bytes)?;
+        write_png_sheet(&episode, (args.columns, args.rows), size, &context.interrupt, &mut bytes)?;
     }
-    context.interrupt.check()?;
-    let ending = if args.format.gif { "gif" } else { "png" };
-    let out = args.out.clone().unwrap_or_else(|| args.recording.with_extension(ending));
     atomic::write_bytes(&out, &bytes)?;
     context.console.say(&format!("render: wrote {}", out.display()));
     Ok(Outcome::Done)

@@ -2,7 +2,7 @@ use super::common::{SettingsArgs, path_or, same_task};
 use super::epochs::Epochs;
 use super::{Context, Outcome, pretrain};
 use crate::config::Stage;
-use crate::data::{table_file, weights};
+use crate::data::{atomic, table_file, weights};
 use crate::error::{Error, Result};
 use crate::learn::{Dynamics, EpochMetrics, Method, train};
 use crate::tasks::Task;
@@ -52,6 +52,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome> {
     let all = [("dataset", dir.as_path()), ("dynamics", model.as_path())];
     let inputs = if needs_model { &all[..] } else { &all[..1] };
     let mut provenance = args.settings.provenance(Stage::Train, &pipeline, inputs)?;
+    [&metrics, &out].into_iter().try_for_each(|path| atomic::check_place(path))?;
     provenance.settings["method"] = format!("{:?}", args.method).to_lowercase().into();
 
     let mut epochs = Epochs::new(&context.console);
@@ -59,8 +60,9 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome> {
     let mut log = |epoch: &EpochMetrics| epochs.step(epoch);
     let trained = train(args.method, &demos, &validation, dynamics, &pipeline.train, seed, &mut log, &context.interrupt)?;
     epochs.finish();
-    table_file::write(&metrics, &trained.metrics, &provenance)?;
-    weights::write(&out, KIND, &trained.policy.to_tensors(), &trained.policy.meta(), &provenance)?;
+    let weights = weights::encode(&out, KIND, &trained.policy.to_tensors(), &trained.policy.meta(), &provenance)?;
+    let table = table_file::encode(&metrics, &trained.metrics, &provenance)?;
+    atomic::write_all(&[(metrics, table), (out.clone(), weights)])?;
     context.console.say(&format!("train: wrote {}", out.display()));
     Ok(Outcome::Done)
 }

@@ -3,9 +3,10 @@
 
 use crate::error::{Error, Result};
 use std::fs::{self, Permissions};
-use std::io::{self, BufWriter, Write};
+use std::io::Write;
 use std::os::unix::fs::PermissionsExt;
-use std::path::Path;
+use std::path::{Path, PathBuf};
+use tempfile::NamedTempFile;
 
 /// Name of what is not whole yet.
 const PREFIX: &str = ".hilt-";
@@ -14,26 +15,50 @@ const FILE_MODE: u32 = 0o666;
 /// Mode of directories before the umask.
 const DIRECTORY_MODE: u32 = 0o777;
 
-/// Writes a file with `fill`, creating the directories above it.
+/// Writes a file of these bytes, creating the directories above it.
 ///
 /// # Errors
 /// [`Error::Io`] naming `path` when the system refuses to create, write, sync or rename.
-pub fn write_file(path: &Path, fill: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> Result<()> {
-    let parent = parent_of(path)?;
-    let file = builder(FILE_MODE).tempfile_in(parent).map_err(|e| Error::io(path, "create", e))?;
-    let mut out = BufWriter::new(file);
-    let written = fill(&mut out).and_then(|()| out.flush()).and_then(|()| out.get_ref().as_file().sync_all());
-    written.map_err(|e| Error::io(path, "write", e))?;
-    let (file, _) = out.into_parts();
-    file.persist(path).map(drop).map_err(|e| Error::io(path, "rename", e.error))
+pub fn write_bytes(path: &Path, bytes: &[u8]) -> Result<()> {
+    write_all(&[(path.to_path_buf(), bytes.to_vec())])
 }
 
-/// Writes a file of these bytes; see [`write_file`].
+/// Writes files that belong together: none takes its place before all are on the disk. The last is the one that other stages wait for.
 ///
 /// # Errors
-/// As [`write_file`].
-pub fn write_bytes(path: &Path, bytes: &[u8]) -> Result<()> {
-    write_file(path, |out| out.write_all(bytes))
+/// [`Error::Io`] naming the file at fault; [`Error::Input`] when a directory stands in a file's place.
+pub fn write_all(files: &[(PathBuf, Vec<u8>)]) -> Result<()> {
+    files.iter().try_for_each(|(path, _)| refuse_directory(path))?;
+    let written = files.iter().map(|(path, bytes)| Ok((path, beside(path, bytes)?))).collect::<Result<Vec<_>>>()?;
+    for (path, file) in written {
+        file.persist(path).map_err(|e| Error::io(path, "rename", e.error))?;
+    }
+    Ok(())
+}
+
+/// The bytes in a temporary file beside `path`.
+fn beside(path: &Path, bytes: &[u8]) -> Result<NamedTempFile> {
+    let mut file = builder(FILE_MODE).tempfile_in(parent_of(path)?).map_err(|e| Error::io(path, "create", e))?;
+    file.write_all(bytes).and_then(|()| file.as_file().sync_all()).map_err(|e| Error::io(path, "write", e))?;
+    Ok(file)
+}
+
+/// Whether a file could be written to `path`, asked before the work that makes it; nothing is created.
+///
+/// # Errors
+/// [`Error::Input`] when a directory stands there, [`Error::Io`] when the nearest directory that exists takes no file.
+pub fn check_place(path: &Path) -> Result<()> {
+    refuse_directory(path)?;
+    let above = path.ancestors().skip(1).map(|p| if p.as_os_str().is_empty() { Path::new(".") } else { p });
+    let nearest = above.into_iter().find(|p| p.exists()).unwrap_or(Path::new("."));
+    builder(FILE_MODE).tempfile_in(nearest).map(drop).map_err(|e| Error::io(path, "create", e))
+}
+
+fn refuse_directory(path: &Path) -> Result<()> {
+    if path.is_dir() {
+        return Err(Error::input(path, "is a directory, a file is to be written there; choose another name"));
+    }
+    Ok(())
 }
 
 /// Writes a directory: `fill` gets an empty one beside `path`, which takes its place when `fill` has succeeded. A directory that
@@ -115,17 +140,25 @@ mod tests {
     }
 
     #[test]
-    fn a_writer_that_fails_keeps_the_old_file_and_leaves_nothing() {
+    fn files_that_belong_together_appear_together_or_not_at_all() {
         let dir = tempfile::tempdir().expect("temporary directory");
         let path = dir.path().join("a.txt");
         write_bytes(&path, b"old").expect("written");
-        let failed = write_file(&path, |out| {
-            out.write_all(b"half of it")?;
-            Err(io::Error::from(io::ErrorKind::StorageFull))
-        });
-        assert!(matches!(failed, Err(Error::Io { action: "write", .. })));
+        // The second of two files has no place: the first must not take its own.
+        let pair = [(path.clone(), b"new".to_vec()), (path.join("b.txt"), b"new".to_vec())];
+        assert!(matches!(write_all(&pair), Err(Error::Io { .. })));
         assert_eq!(fs::read(&path).expect("still there"), b"old");
         assert_eq!(names(dir.path()), ["a.txt"]);
+    }
+
+    #[test]
+    fn a_place_is_checked_without_a_trace() {
+        let dir = tempfile::tempdir().expect("temporary directory");
+        check_place(&dir.path().join("new/er/file")).expect("can be made");
+        assert!(check_place(dir.path()).unwrap_err().to_string().contains("is a directory"));
+        write_bytes(&dir.path().join("file"), b"").expect("written");
+        assert!(matches!(check_place(&dir.path().join("file/inner")), Err(Error::Io { .. })));
+        assert_eq!(names(dir.path()), ["file"]);
     }
 
     #[test]

@@ -8,8 +8,16 @@ use std::path::Path;
 /// Writes an object with the further key `hilt`.
 ///
 /// # Errors
-/// [`Error::Input`] when `content` is no JSON object, [`Error::Io`] when the system refuses.
+/// As [`encode`]; [`Error::Io`] when the system refuses.
 pub fn write(path: &Path, content: &Value, provenance: &Provenance) -> Result<()> {
+    atomic::write_bytes(path, &encode(path, content, provenance)?)
+}
+
+/// The bytes of the file that [`write`] writes to `path`.
+///
+/// # Errors
+/// [`Error::Input`] when `content` is no JSON object.
+pub fn encode(path: &Path, content: &Value, provenance: &Provenance) -> Result<Vec<u8>> {
     let Value::Object(fields) = content else {
         return Err(Error::input(path, "a summary is a JSON object"));
     };
@@ -17,7 +25,7 @@ pub fn write(path: &Path, content: &Value, provenance: &Provenance) -> Result<()
     fields.insert(provenance::KEY.into(), json!({ "provenance": provenance, "seal": seal::blank() }));
     let mut text = serde_json::to_string_pretty(&fields).expect("a JSON value has string keys");
     text.push('\n');
-    atomic::write_bytes(path, &seal::close(text.into_bytes()))
+    Ok(seal::close(text.into_bytes()))
 }
 
 /// Reads what [`write`] wrote, without the key `hilt`.

@@ -42,8 +42,16 @@ pub fn unit_of(name: &str) -> Option<&'static str> {
 /// Writes a table. NaN is kept; a reader that cannot use it says so.
 ///
 /// # Errors
-/// [`Error::Input`] when the columns differ in length or share a name, [`Error::Io`] when the system refuses.
+/// As [`encode`]; [`Error::Io`] when the system refuses.
 pub fn write(path: &Path, table: &Table, provenance: &Provenance) -> Result<()> {
+    atomic::write_bytes(path, &encode(path, table, provenance)?)
+}
+
+/// The bytes of the file that [`write`] writes to `path`.
+///
+/// # Errors
+/// [`Error::Input`] when the columns differ in length or share a name.
+pub fn encode(path: &Path, table: &Table, provenance: &Provenance) -> Result<Vec<u8>> {
     for (i, column) in table.columns.iter().enumerate() {
         if column.values.len() != table.rows() {
             let message = format!("column {} has {} rows, the first has {}", column.name, column.values.len(), table.rows());
@@ -54,8 +62,7 @@ pub fn write(path: &Path, table: &Table, provenance: &Provenance) -> Result<()> 
         }
     }
     let batch = to_batch(table).map_err(|e| parquet_file::cannot_encode(path, e))?;
-    let bytes = parquet_file::of_batch(&batch, provenance).map_err(|e| parquet_file::cannot_encode(path, e))?;
-    atomic::write_bytes(path, &bytes)
+    parquet_file::of_batch(&batch, provenance).map_err(|e| parquet_file::cannot_encode(path, e))
 }
 
 /// Reads what [`write`] wrote.

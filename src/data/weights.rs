@@ -27,9 +27,16 @@ struct Header {
 /// Writes weights of a `kind` ("policy" or "dynamics") with `meta`, all that is needed to run them.
 ///
 /// # Errors
-/// [`Error::Input`] when a tensor's length does not fit its shape, two share a name, or a number is not finite; [`Error::Io`]
-/// when the system refuses.
+/// As [`encode`]; [`Error::Io`] when the system refuses.
 pub fn write(path: &Path, kind: &str, tensors: &[NamedTensor], meta: &Value, provenance: &Provenance) -> Result<()> {
+    atomic::write_bytes(path, &encode(path, kind, tensors, meta, provenance)?)
+}
+
+/// The bytes of the file that [`write`] writes to `path`.
+///
+/// # Errors
+/// [`Error::Input`] when a tensor's length does not fit its shape, two share a name, or a number is not finite.
+pub fn encode(path: &Path, kind: &str, tensors: &[NamedTensor], meta: &Value, provenance: &Provenance) -> Result<Vec<u8>> {
     for (i, tensor) in tensors.iter().enumerate() {
         let expected: usize = tensor.shape.iter().product();
         if tensor.data.len() != expected {
@@ -55,7 +62,7 @@ pub fn write(path: &Path, kind: &str, tensors: &[NamedTensor], meta: &Value, pro
     let views = views.collect::<std::result::Result<Vec<_>, _>>().map_err(cannot)?;
     let metadata = HashMap::from([(provenance::KEY.to_string(), header)]);
     let file = safetensors::serialize(views, Some(metadata)).map_err(cannot)?;
-    atomic::write_bytes(path, &seal::close(file))
+    Ok(seal::close(file))
 }
 
 /// Reads weights of a `kind`, in the order they were written.

@@ -174,7 +174,7 @@ pub fn policy_gradient(
         from += shard.d_bc.len();
         (shard, d_first.get(start..from))
     });
-    let mut parts: [Option<(&mut Shard, Option<&[f32]>)>; shards::MAX_SHARDS] = collect_array(parts);
+    let mut parts: [Option<_>; shards::MAX_SHARDS] = collect_array(parts);
     parts.par_iter_mut().flatten().for_each(|(shard, d_first)| {
         let rows = shard.d_bc.len() / JOINTS;
         for (d, bc) in shard.pass.d_output.iter_mut().zip(&shard.d_bc) {

@@ -8,6 +8,7 @@ use arrow_array::{Array, ArrayRef, FixedSizeListArray, Float32Array, RecordBatch
 use hilt::data::dataset::{self, Dataset, DatasetEpisode};
 use hilt::data::{hash_path, inspect};
 use hilt::demo::{Demo, Episode};
+use hilt::interrupt::Interrupt;
 use hilt::tasks::Task;
 use parquet::arrow::ArrowWriter;
 use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
@@ -57,7 +58,7 @@ fn datasets_round_trip_exactly_with_the_last_state() {
         assert_eq!((source_episodes, successes, fps), (vec![0, 3, 4], vec![true; 3], 20));
         assert_eq!(rewards[0], [0.0, 0.0, 0.1, 0.0, 0.0], "the reward of state 3 belongs to action 2");
         assert_eq!(origin, provenance("convert", task));
-        let told = inspect(&here).expect("a dataset");
+        let told = inspect(&here, &Interrupt::default()).expect("a dataset");
         assert_eq!((&told["kind"], &told["frames"]), (&"dataset".into(), &18.into()));
     }
 }

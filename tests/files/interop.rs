@@ -3,6 +3,7 @@
 use crate::fixtures::{episode, provenance, table, tensors};
 use hilt::data::dataset::{self, DatasetEpisode};
 use hilt::data::{json_file, recording, table_file, weights};
+use hilt::interrupt::Interrupt;
 use hilt::tasks::Task;
 use serde_json::json;
 use std::path::PathBuf;
@@ -23,7 +24,15 @@ fn write_a_run() {
         let demos: Vec<_> = episodes.iter().map(|e| e.to_demo().expect("a demo")).collect();
         let (train, validation) = dataset::split(episodes.len(), 10, 0);
         let pick = |of: &[usize]| of.iter().map(|i| DatasetEpisode::of(&episodes[*i], &demos[*i])).collect::<Vec<_>>();
-        dataset::write_split(&dir.join("dataset"), task, &pick(&train), &pick(&validation), &origin("convert")).expect("written");
+        dataset::write_split(
+            &dir.join("dataset"),
+            task,
+            &pick(&train),
+            &pick(&validation),
+            &origin("convert"),
+            &Interrupt::default(),
+        )
+        .expect("written");
         for kind in ["dynamics", "policy"] {
             weights::write(&dir.join(format!("{kind}.safetensors")), kind, &tensors(), &json!({}), &origin("train"))
                 .expect("written");

@@ -9,6 +9,7 @@ mod viewers;
 use fixtures::{episode, provenance, table, tensors};
 use hilt::data::{hash_path, inspect, inspect_text, json_file, recording, table_file, weights};
 use hilt::error::{Error, Result};
+use hilt::interrupt::Interrupt;
 use hilt::table::Values;
 use hilt::tasks::Task;
 use serde_json::json;
@@ -169,7 +170,7 @@ fn another_schema_version_is_named_whoever_wrote_it() {
     let names = ["a.mcap", "a.parquet", "a.safetensors", "a.json"];
     write_all(&newer);
     for name in names {
-        let message = inspect(&at(name)).unwrap_err().to_string();
+        let message = inspect(&at(name), &Interrupt::default()).unwrap_err().to_string();
         assert!(message.contains("schema version 2, this hilt reads version 1"), "{message}");
     }
     write_all(&provenance("simulate", task));
@@ -182,7 +183,7 @@ fn another_schema_version_is_named_whoever_wrote_it() {
             bytes[digit] = b'5';
         }
         fs::write(at(name), bytes).expect("edited");
-        let message = inspect(&at(name)).unwrap_err().to_string();
+        let message = inspect(&at(name), &Interrupt::default()).unwrap_err().to_string();
         assert!(message.contains("schema version 5"), "{message}");
     }
 }
@@ -191,7 +192,7 @@ fn another_schema_version_is_named_whoever_wrote_it() {
 fn a_missing_file_is_an_error_of_the_system() {
     let path = Path::new("no/such/episode-00000.mcap");
     assert!(matches!(recording::read(path), Err(Error::Io { action: "read", .. })));
-    assert!(matches!(inspect(path), Err(Error::Io { .. })));
+    assert!(matches!(inspect(path, &Interrupt::default()), Err(Error::Io { .. })));
 }
 
 #[test]
@@ -208,7 +209,7 @@ fn inspect_knows_every_kind() {
     weights::write(&at("w.safetensors"), "dynamics", &tensors(), &json!({ "hidden": 32 }), &origin).expect("written");
     json_file::write(&at("e.json"), &json!({ "success_rate": 0.98 }), &origin).expect("written");
     let kind = |name: &str| {
-        let found = inspect(&at(name)).expect("an artefact");
+        let found = inspect(&at(name), &Interrupt::default()).expect("an artefact");
         assert_eq!(found["provenance"]["seed"], 7);
         assert!(inspect_text(&found).contains("stage: simulate"));
         found
@@ -224,5 +225,10 @@ fn inspect_knows_every_kind() {
     assert_eq!(columns["columns"][1]["unit"], "m/s");
     assert_eq!(kind("w.safetensors")["parameters"], 9 * 32 + 32 * 25 + 32);
     assert_eq!(kind("e.json")["content"]["success_rate"], 0.98);
-    assert!(inspect(dir.path()).unwrap_err().to_string().contains("neither a dataset nor a directory of recordings"));
+    assert!(
+        inspect(dir.path(), &Interrupt::default())
+            .unwrap_err()
+            .to_string()
+            .contains("neither a dataset nor a directory of recordings")
+    );
 }

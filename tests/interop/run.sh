@@ -1,16 +1,26 @@
 #!/bin/sh
-# Reads a finished run with other people's programs. Usage: tests/interop/run.sh RUNS   (RUNS holds TASK/recordings, TASK/dataset, ...)
-# PYTHON names a Python 3.12 (default: python3.12). The packages (1 to 2 GB with torch) go to target/interop, once.
+# Reads finished runs with other people's programs. Usage: tests/interop/run.sh RUNS   (RUNS holds TASK/recordings, TASK/dataset, ...)
+# PYTHON names a Python 3.12; without it python3.12 on the PATH, then pyenv's. The packages (6 GB, most of it torch) go to
+# target/interop, once.
 set -eu
 [ $# -eq 1 ] || { echo "usage: $0 RUNS" >&2; exit 2; }
 here=$(cd "$(dirname "$0")" && pwd)
 home=$here/../../target/interop
-python=${PYTHON:-python3.12}
-command -v "$python" > /dev/null || { echo "$python not found; set PYTHON to a Python 3.12" >&2; exit 2; }
+
+is_3_12() {
+    [ "$("$1" -c 'import sys, venv, ensurepip; print("%d.%d" % sys.version_info[:2])' 2> /dev/null)" = 3.12 ]
+}
+python=
+for candidate in ${PYTHON:+"$PYTHON"} python3.12 "${PYENV_ROOT:-$HOME/.pyenv}"/versions/3.12*/bin/python3.12 python3; do
+    if is_3_12 "$candidate"; then python=$candidate; break; fi
+done
+[ -n "$python" ] || { echo "Python 3.12 with venv is missing: install it (apt install python3.12-venv, pyenv install 3.12) or set PYTHON" >&2; exit 2; }
+
 mkdir -p "$home"
 if ! cmp -s "$here/requirements.txt" "$home/installed.txt"; then
-    "$python" -m venv "$home/venv"
-    "$home/venv/bin/pip" install --quiet --requirement "$here/requirements.txt"
+    echo "installing the readers into $home (once)"
+    "$python" -m venv --clear "$home/venv"
+    "$home/venv/bin/pip" install --quiet --disable-pip-version-check --requirement "$here/requirements.txt"
     cp "$here/requirements.txt" "$home/installed.txt"
 fi
 HF_HUB_OFFLINE=1 HF_HOME="$home/huggingface" exec "$home/venv/bin/python" "$here/run.py" "$1"

@@ -18,6 +18,7 @@ pub use split::split;
 use super::{Provenance, atomic, parquet_file};
 use crate::demo::{Demo, Episode};
 use crate::error::{Error, Result};
+use crate::interrupt::Interrupt;
 use crate::tasks::Task;
 use arrow_array::RecordBatch;
 use arrow_schema::Schema;
@@ -67,28 +68,31 @@ impl<'a> DatasetEpisode<'a> {
 /// [`Error::Input`] without episodes, for a demo of another task, for rewards that do not fit or are not finite, or when the place
 /// holds something else; [`Error::Io`] when the system refuses.
 pub fn write(root: &Path, task: Task, episodes: &[DatasetEpisode], provenance: &Provenance) -> Result<()> {
-    atomic::write_dir(root, |name| matches!(name, "meta" | "data"), |dir| fill(dir, task, episodes, provenance, DATA_FILE_BYTES))
+    let content = Content { task, provenance, file_bytes: DATA_FILE_BYTES, interrupt: &Interrupt::default() };
+    atomic::write_dir(root, |name| matches!(name, "meta" | "data"), |dir| content.fill(dir, episodes))
 }
 
 /// Writes training and validation datasets as `parent/train` and `parent/validation`, both or none. Without validation episodes
 /// there is no validation root.
 ///
 /// # Errors
-/// As [`write`].
+/// As [`write`]; [`Error::Interrupted`].
 pub fn write_split(
     parent: &Path,
     task: Task,
     train: &[DatasetEpisode],
     validation: &[DatasetEpisode],
     provenance: &Provenance,
+    interrupt: &Interrupt,
 ) -> Result<()> {
+    let content = Content { task, provenance, file_bytes: DATA_FILE_BYTES, interrupt };
     atomic::write_dir(
         parent,
         |name| matches!(name, TRAIN | VALIDATION),
         |dir| {
             for (name, episodes) in [(TRAIN, train), (VALIDATION, validation)] {
                 if name == TRAIN || !episodes.is_empty() {
-                    fill(&dir.join(name), task, episodes, provenance, DATA_FILE_BYTES)?;
+                    content.fill(&dir.join(name), episodes)?;
                 }
             }
             Ok(())
@@ -96,18 +100,66 @@ pub fn write_split(
     )
 }
 
-fn fill(dir: &Path, task: Task, episodes: &[DatasetEpisode], provenance: &Provenance, file_bytes: usize) -> Result<()> {
-    check_episodes(dir, task, episodes)?;
-    let features = features(task);
-    let mut all = Vec::with_capacity(episodes.len());
-    let mut first = 0;
-    for (number, episode) in episodes.iter().enumerate() {
-        all.push(features::cells(task, episode, number, first));
-        first += episode.demo.len();
+/// What the datasets of one call share.
+struct Content<'a> {
+    task: Task,
+    provenance: &'a Provenance,
+    /// A data file is closed once it is this big.
+    file_bytes: usize,
+    interrupt: &'a Interrupt,
+}
+
+impl Content<'_> {
+    fn fill(&self, dir: &Path, episodes: &[DatasetEpisode]) -> Result<()> {
+        check_episodes(dir, self.task, episodes)?;
+        let features = features(self.task);
+        let mut all = Vec::with_capacity(episodes.len());
+        let mut first = 0;
+        for (number, episode) in episodes.iter().enumerate() {
+            self.interrupt.check()?;
+            all.push(features::cells(self.task, episode, number, first));
+            first += episode.demo.len();
+        }
+        let mut files = BTreeMap::new();
+        let places = self.write_data(dir, &features, &all, &mut files)?;
+        self.interrupt.check()?;
+        meta::write(dir, self.task, &features, &all, &places, self.provenance, files)
     }
-    let mut files = BTreeMap::new();
-    let places = write_data(dir, &features, &all, provenance, file_bytes, &mut files)?;
-    meta::write(dir, task, &features, &all, &places, provenance, files)
+
+    /// Writes the data files, an episode a row group; adds their hashes to `files` and returns where each episode went.
+    fn write_data(
+        &self,
+        dir: &Path,
+        features: &[Feature],
+        episodes: &[Vec<Cells>],
+        files: &mut BTreeMap<String, String>,
+    ) -> Result<Vec<Place>> {
+        let schema = Arc::new(Schema::new(features.iter().map(features::field).collect::<Vec<_>>()));
+        let mut places: Vec<Place> = Vec::with_capacity(episodes.len());
+        let mut waiting = episodes;
+        for number in 0.. {
+            if waiting.is_empty() {
+                break;
+            }
+            let place = Place::of_file(number);
+            let name = place.data_path();
+            let cannot = |e: &dyn std::fmt::Display| parquet_file::cannot_encode(&dir.join(&name), e);
+            let mut writer = parquet_file::Writer::new(&schema, self.provenance).map_err(|e| cannot(&e))?;
+            while let Some((cells, rest)) = waiting.split_first() {
+                self.interrupt.check()?;
+                let arrays = cells.iter().zip(features).map(|(c, f)| c.to_array(f.width)).collect();
+                let batch = RecordBatch::try_new(Arc::clone(&schema), arrays).map_err(|e| cannot(&e))?;
+                writer.row_group(&batch).map_err(|e| cannot(&e))?;
+                places.push(place);
+                waiting = rest;
+                if writer.len() >= self.file_bytes {
+                    break;
+                }
+            }
+            meta::put(dir, &name, &writer.finish().map_err(|e| cannot(&e))?, files)?;
+        }
+        Ok(places)
+    }
 }
 
 fn check_episodes(root: &Path, task: Task, episodes: &[DatasetEpisode]) -> Result<()> {
@@ -132,41 +184,6 @@ fn check_episodes(root: &Path, task: Task, episodes: &[DatasetEpisode]) -> Resul
     Ok(())
 }
 
-/// Writes the data files, an episode a row group; adds their hashes to `files` and returns where each episode went.
-fn write_data(
-    dir: &Path,
-    features: &[Feature],
-    episodes: &[Vec<Cells>],
-    provenance: &Provenance,
-    file_bytes: usize,
-    files: &mut BTreeMap<String, String>,
-) -> Result<Vec<Place>> {
-    let schema = Arc::new(Schema::new(features.iter().map(features::field).collect::<Vec<_>>()));
-    let mut places: Vec<Place> = Vec::with_capacity(episodes.len());
-    let mut waiting = episodes;
-    for number in 0.. {
-        if waiting.is_empty() {
-            break;
-        }
-        let place = Place::of_file(number);
-        let name = place.data_path();
-        let cannot = |e: &dyn std::fmt::Display| parquet_file::cannot_encode(&dir.join(&name), e);
-        let mut writer = parquet_file::Writer::new(&schema, provenance).map_err(|e| cannot(&e))?;
-        while let Some((cells, rest)) = waiting.split_first() {
-            let arrays = cells.iter().zip(features).map(|(c, f)| c.to_array(f.width)).collect();
-            let batch = RecordBatch::try_new(Arc::clone(&schema), arrays).map_err(|e| cannot(&e))?;
-            writer.row_group(&batch).map_err(|e| cannot(&e))?;
-            places.push(place);
-            waiting = rest;
-            if writer.len() >= file_bytes {
-                break;
-            }
-        }
-        meta::put(dir, &name, &writer.finish().map_err(|e| cannot(&e))?, files)?;
-    }
-    Ok(places)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -188,7 +205,8 @@ mod tests {
             .collect();
         let dir = tempfile::tempdir().expect("temporary directory");
         let provenance = Provenance::new("convert", task, serde_json::json!({}), 0);
-        fill(dir.path(), task, &episodes, &provenance, 1).expect("written");
+        let content = Content { task, provenance: &provenance, file_bytes: 1, interrupt: &Interrupt::default() };
+        content.fill(dir.path(), &episodes).expect("written");
         assert!(dir.path().join("data/chunk-000/file-003.parquet").is_file());
         let found = read(dir.path()).expect("readable");
         assert_eq!(found.demos, demos);

@@ -8,6 +8,7 @@ pub use text::inspect_text;
 use super::dataset::{self, Dataset, TRAIN, VALIDATION};
 use super::{Provenance, json_file, recording, table_file, weights};
 use crate::error::{Error, Result};
+use crate::interrupt::Interrupt;
 use crate::state::{State, action_names};
 use crate::table::{Column, Values};
 use serde_json::{Map, Value, json};
@@ -18,10 +19,11 @@ use std::path::Path;
 /// summary. The field `kind` says which; `provenance` is what it carries of its origin.
 ///
 /// # Errors
-/// [`Error::Input`] when it is none of these, or is one that its own reader refuses; [`Error::Io`] when it cannot be read.
-pub fn inspect(path: &Path) -> Result<Value> {
+/// [`Error::Input`] when it is none of these, or is one that its own reader refuses; [`Error::Io`] when it cannot be read;
+/// [`Error::Interrupted`].
+pub fn inspect(path: &Path, interrupt: &Interrupt) -> Result<Value> {
     if path.is_dir() {
-        return directory(path);
+        return directory(path, interrupt);
     }
     match path.extension().and_then(|e| e.to_str()) {
         Some("mcap") => recordings::one(path),
@@ -37,7 +39,7 @@ pub fn inspect(path: &Path) -> Result<Value> {
     }
 }
 
-fn directory(path: &Path) -> Result<Value> {
+fn directory(path: &Path, interrupt: &Interrupt) -> Result<Value> {
     if path.join("meta").is_dir() {
         return Ok(described_dataset(&dataset::read(path)?));
     }
@@ -49,7 +51,7 @@ fn directory(path: &Path) -> Result<Value> {
         }
         return Ok(Value::Object(found));
     }
-    recordings::all(path)
+    recordings::all(path, interrupt)
 }
 
 /// The first fields of every answer.

@@ -3,6 +3,7 @@
 use super::{answer, by_entry, recording, statistics};
 use crate::demo::{Episode, Phase, Step};
 use crate::error::{Error, Result};
+use crate::interrupt::Interrupt;
 use crate::state::{CONTROL_DT_S, State, action_names};
 use crate::tasks::FailureClass;
 use serde_json::{Map, Value, json};
@@ -35,13 +36,14 @@ pub(super) fn one(path: &Path) -> Result<Value> {
 }
 
 /// All recordings in a directory.
-pub(super) fn all(dir: &Path) -> Result<Value> {
+pub(super) fn all(dir: &Path, interrupt: &Interrupt) -> Result<Value> {
     let names = file_names(dir)?;
     if names.is_empty() {
         return Err(Error::input(dir, "is neither a dataset nor a directory of recordings (episode-00000.mcap, ...)"));
     }
     let (mut episodes, mut origin) = (Vec::new(), None);
     for name in &names {
+        interrupt.check()?;
         let (episode, provenance) = recording::read(&dir.join(name))?;
         origin = Some(provenance);
         episodes.push(episode);

@@ -4,6 +4,7 @@ use super::colors::{Palette, UNCHANGED};
 use super::{Renderer, RgbImage, check_size, font, label, step_at};
 use crate::demo::Episode;
 use crate::error::{Error, Result};
+use crate::interrupt::Interrupt;
 use gif::{DisposalMethod, Encoder, EncodingError, Frame, Repeat};
 use std::io::Write;
 
@@ -36,8 +37,8 @@ impl Default for GifOptions {
 /// rectangle that changed, and in it only the pixels that changed.
 ///
 /// # Errors
-/// [`Error::Usage`] for options out of range, [`Error::Failed`] when `out` refuses.
-pub fn write_gif<W: Write>(episode: &Episode, options: &GifOptions, out: W) -> Result<()> {
+/// [`Error::Usage`] for options out of range, [`Error::Failed`] when `out` refuses; [`Error::Interrupted`].
+pub fn write_gif<W: Write>(episode: &Episode, options: &GifOptions, interrupt: &Interrupt, out: W) -> Result<()> {
     check_size("an animation", (options.width, options.height))?;
     if options.every_n_steps == 0 || !(1..=MOST_FPS).contains(&options.fps) {
         return Err(Error::Usage(format!(
@@ -45,28 +46,25 @@ pub fn write_gif<W: Write>(episode: &Episode, options: &GifOptions, out: W) -> R
             options.every_n_steps, options.fps
         )));
     }
-    encode(episode, options, out).map_err(|e| Error::Failed(format!("cannot write the animation: {e}")))
-}
-
-fn encode<W: Write>(episode: &Episode, options: &GifOptions, out: W) -> std::result::Result<(), EncodingError> {
+    let failed = |e: EncodingError| Error::Failed(format!("cannot write the animation: {e}"));
     let mut palette = Palette::new();
-    let mut encoder = Encoder::new(out, options.width as u16, options.height as u16, &palette.bytes())?;
-    encoder.set_repeat(Repeat::Infinite)?;
+    let mut encoder = Encoder::new(out, options.width as u16, options.height as u16, &palette.bytes()).map_err(failed)?;
+    encoder.set_repeat(Repeat::Infinite).map_err(failed)?;
     let mut renderer = Renderer::new(&episode.scene, (options.width, options.height));
     let delay = (100.0 / f64::from(options.fps)).round() as u16;
     let last = episode.steps.len();
     let mut shown: Option<Vec<u8>> = None;
     for step in (0..last).step_by(options.every_n_steps as usize).chain([last]) {
+        interrupt.check()?;
         let mut picture = renderer.draw(step_at(episode, step));
         let (text, color) = label(episode, step);
         font::write(&mut picture, &text, color);
         let indices = quantize(&picture, &mut palette);
         let delay = if step == last { LAST_DELAY_CS } else { delay };
-        encoder.write_frame(&difference(&indices, shown.as_deref(), options.width as usize, delay))?;
+        encoder.write_frame(&difference(&indices, shown.as_deref(), options.width as usize, delay)).map_err(failed)?;
         shown = Some(indices);
     }
-    encoder.into_inner()?.flush()?;
-    Ok(())
+    encoder.into_inner().map_err(failed)?.flush().map_err(|e| failed(e.into()))
 }
 
 fn quantize(picture: &RgbImage, palette: &mut Palette) -> Vec<u8> {

@@ -1,0 +1,129 @@
+//! Ctrl-C in every stage: exit code 130, a word to the person, no trace in the files.
+
+use crate::runs::{HILT, Run, contents, text};
+use hilt::data::table_file;
+use hilt::plan::{from_table, to_table};
+use std::fs;
+use std::os::unix::fs::symlink;
+use std::process::{Child, Command, Stdio};
+use std::time::{Duration, Instant};
+
+/// Into the work, far from its end.
+const SOON: Duration = Duration::from_millis(400);
+/// From the signal to the end of the process: a few items of work, on a busy machine.
+const PATIENCE: Duration = Duration::from_secs(20);
+/// Recordings that take seconds to read and to write.
+const MANY: usize = 4000;
+
+fn start(words: Vec<String>) -> Child {
+    Command::new(HILT).args(words).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().expect("the binary runs")
+}
+
+fn signal(child: &Child, name: &str) {
+    let sent = Command::new("kill").args([format!("-{name}"), child.id().to_string()]).status().expect("kill runs");
+    assert!(sent.success(), "the process has ended already");
+}
+
+/// Sends the signal after a while; expects the end that belongs to it and the run as it was.
+fn interrupted_by(name: &str, run: &Run, words: Vec<String>, wait: Duration) {
+    let (before, what) = (contents(run.path()), format!("{words:?}"));
+    let mut child = start(words);
+    std::thread::sleep(wait);
+    signal(&child, name);
+    let sent = Instant::now();
+    while child.try_wait().expect("waits").is_none() && sent.elapsed() < PATIENCE {
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    if child.try_wait().expect("waits").is_none() {
+        child.kill().expect("killed");
+        panic!("{what} did not stop within {PATIENCE:?}");
+    }
+    let output = child.wait_with_output().expect("ended");
+    let stderr = text(&output.stderr);
+    assert_eq!(output.status.code(), Some(130), "{what}: {stderr}");
+    assert!(stderr.contains("error: interrupted; no artefact was changed"), "{what}: {stderr}");
+    assert!(output.stdout.is_empty(), "{what} printed a result");
+    run.unchanged(&what, &before);
+}
+
+fn long(run: &Run, stage: &str, further: &[&str]) -> Vec<String> {
+    run.words(stage).into_iter().chain(further.iter().map(|w| w.to_string())).collect()
+}
+
+#[test]
+fn planning_learning_and_evaluation_stop() {
+    let run = Run::finished();
+    for words in [
+        long(&run, "plan", &["--episodes", "100000"]),
+        long(&run, "pretrain", &["--set", "pretrain.epochs=1000000"]),
+        long(&run, "train", &["--set", "train.warm_start_updates=10000000"]),
+        long(&run, "train", &["--set", "train.epochs=1000000", "--method", "sc"]),
+        long(&run, "evaluate", &["--episodes", "100000"]),
+        long(&run, "evaluate", &["--episodes", "100000", "--policy", "planner"]),
+    ] {
+        interrupted_by("INT", &run, words, SOON);
+    }
+    interrupted_by("TERM", &run, long(&run, "plan", &["--episodes", "100000"]), SOON);
+}
+
+#[test]
+fn simulation_stops() {
+    let run = Run::finished();
+    let path = run.at("plans.parquet");
+    let (table, origin) = table_file::read(&path).expect("plans");
+    let plan = from_table(&table).expect("plans").swap_remove(0);
+    let plans: Vec<_> = (0..1000).map(|index| hilt::plan::Plan { index, ..plan.clone() }).collect();
+    table_file::write(&path, &to_table(&plans), &origin).expect("written");
+    interrupted_by("INT", &run, run.words("simulate"), SOON);
+}
+
+#[test]
+fn conversion_and_inspection_stop_while_they_read_and_while_they_write() {
+    let run = Run::finished();
+    let one = fs::canonicalize(run.at("recordings/episode-00000.mcap")).expect("a recording");
+    let many = tempfile::tempdir().expect("temporary directory");
+    for index in 0..MANY {
+        symlink(&one, many.path().join(format!("episode-{index:05}.mcap"))).expect("linked");
+    }
+    let name = many.path().to_str().expect("UTF-8 path").to_string();
+    let words = long(&run, "convert", &[]).into_iter().map(|w| if w == run.name("recordings") { name.clone() } else { w });
+    let words: Vec<String> = words.collect();
+    interrupted_by("INT", &run, words.clone(), SOON);
+    interrupted_by("INT", &run, vec!["inspect".into(), name], SOON);
+
+    // While the dataset is being written, its unfinished directory stands beside its place.
+    let before = contents(run.path());
+    let child = start(words);
+    let started = Instant::now();
+    let writing =
+        || fs::read_dir(run.path()).expect("readable").flatten().any(|e| e.file_name().to_string_lossy().starts_with(".hilt-"));
+    while !writing() {
+        assert!(started.elapsed() < Duration::from_secs(120), "nothing is being written");
+        std::thread::sleep(Duration::from_millis(2));
+    }
+    signal(&child, "INT");
+    let output = child.wait_with_output().expect("ended");
+    assert_eq!(output.status.code(), Some(130), "{}", text(&output.stderr));
+    run.unchanged("convert while it writes", &before);
+}
+
+#[test]
+fn drawing_stops() {
+    let run = Run::finished();
+    let further = |words: Vec<String>, more: &[&str]| words.into_iter().chain(more.iter().map(|w| w.to_string())).collect();
+    let large = ["--width", "3000", "--height", "3000", "--every", "1"];
+    interrupted_by("INT", &run, further(run.render("--gif", "a.gif"), &large), SOON);
+    let tiles = ["--width", "300", "--height", "300", "--columns", "32", "--rows", "32"];
+    interrupted_by("INT", &run, further(run.render("--png", "a.png"), &tiles), SOON);
+}
+
+#[test]
+fn a_second_signal_does_not_wait() {
+    let run = Run::finished();
+    let child = start(long(&run, "plan", &["--episodes", "100000"]));
+    std::thread::sleep(SOON);
+    // The first may be enough; the second finds the process or nobody.
+    signal(&child, "INT");
+    let _ = Command::new("kill").args(["-INT", &child.id().to_string()]).stderr(Stdio::null()).status();
+    assert_eq!(child.wait_with_output().expect("ended").status.code(), Some(130));
+}

@@ -1,0 +1,8 @@
+//! The stages as processes, chained over files: bad input, interruption, full disks, reproducibility, and the files in `fixtures/`.
+
+mod bad_input;
+mod bad_numbers;
+mod full_disk;
+mod interrupted;
+mod reproducible;
+mod runs;
