@@ -1,12 +1,15 @@
 use super::common::{SettingsArgs, path_or, same_task};
 use super::{Context, Outcome, output, train};
 use crate::config::{Pipeline, Stage};
-use crate::data::{atomic, json_file, table_file, weights};
+use crate::data::provenance::Provenance;
+use crate::data::{atomic, json_file, recording, table_file, weights};
+use crate::demo::Episode;
 use crate::error::{Error, Result};
 use crate::eval::{PolicyController, Rollouts, Summary, Trial, to_table};
 use crate::learn::Policy;
 use crate::plan::Planner;
 use crate::report::table::text_table;
+use crate::robot::urdf;
 use crate::scene::Scene;
 use crate::seed;
 use crate::sim::{Controller, Follower};
@@ -36,6 +39,17 @@ pub struct Args {
     /// Write the summary to this JSON file and the log of the episodes beside it, as .parquet
     #[arg(long, value_name = "FILE.json")]
     out: Option<PathBuf>,
+    /// Record every episode as MCAP into this directory
+    #[arg(long, value_name = "DIR")]
+    record: Option<PathBuf>,
+}
+
+/// Who acts.
+enum Subject {
+    /// The demonstrator, in the loop.
+    Planner,
+    /// A learned policy.
+    Policy(Arc<Policy>),
 }
 
 pub fn run(args: &Args, context: &Context) -> Result<Outcome> {
@@ -43,17 +57,25 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome> {
     let stochastic = ("evaluate.stochastic", args.stochastic.then(|| "true".to_string()));
     let pipeline = args.settings.resolve(&[episodes, stochastic])?;
     let path = path_or(args.policy.as_deref(), pipeline.task, "policy.safetensors");
-    let by_planner = path == Path::new(PLANNER);
+    let (subject, inputs) = match path.as_path() {
+        planner if planner == Path::new(PLANNER) => (Subject::Planner, vec![]),
+        file => (Subject::Policy(Arc::new(read_policy(file, &pipeline)?)), vec![("policy", file)]),
+    };
+    let horizon_steps = subject.horizon_steps(&pipeline);
+    let mut provenance = args.settings.provenance(Stage::Evaluate, &pipeline, &inputs)?;
+    provenance.settings["evaluate"]["horizon_steps"] = horizon_steps.into();
+    provenance.settings["policy"] = if inputs.is_empty() { PLANNER } else { train::KIND }.into();
 
-    let (trials, inputs): (_, Vec<(&str, &Path)>) = if by_planner {
-        (planner(args, &pipeline, context)?, vec![])
-    } else {
-        (policy(args, &path, &pipeline, context)?, vec![("policy", &path)])
+    if let Some(out) = &args.out {
+        [out, &out.with_extension("parquet")].into_iter().try_for_each(|path| atomic::check_place(path))?;
+    }
+    let rollouts = Rollouts { pipeline: &pipeline, seed: args.settings.seed, horizon_steps };
+    let trials = match &args.record {
+        None => run_all(&rollouts, &subject, context, |_| Ok(()))?,
+        Some(dir) => record_all(dir, &rollouts, &subject, context, &provenance)?,
     };
     let summary = Summary::of(pipeline.task, &trials);
     if let Some(out) = &args.out {
-        let mut provenance = args.settings.provenance(Stage::Evaluate, &pipeline, &inputs)?;
-        provenance.settings["policy"] = if by_planner { PLANNER } else { train::KIND }.into();
         let value = serde_json::to_value(&summary).map_err(|e| Error::Failed(format!("cannot write JSON: {e}")))?;
         let log = out.with_extension("parquet");
         let table = table_file::encode(&log, &to_table(pipeline.task, &trials), &provenance)?;
@@ -62,54 +84,78 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome> {
     if args.json {
         output::print_json(&summary)?
     } else {
-        output::print(&words(&summary))?
+        output::print(&words(&summary, &trials))?
     }
     Ok(Outcome::Done)
 }
 
-fn planner(args: &Args, pipeline: &Pipeline, context: &Context) -> Result<Vec<Trial>> {
-    let horizon_steps = match pipeline.evaluate.horizon_steps {
-        0 => pipeline.simulate.max_steps,
-        given => given,
-    };
-    rollouts(args, pipeline, horizon_steps, context, |index, scene| {
-        let plan =
-            Planner::new(&pipeline.plan).plan(index, scene, &mut seed::stream(args.settings.seed, "evaluate.search", index));
-        Ok(plan.ok().and_then(|plan| Follower::new(&plan)).map(|follower| Box::new(follower) as Box<dyn Controller>))
-    })
-}
-
-fn policy(args: &Args, path: &Path, pipeline: &Pipeline, context: &Context) -> Result<Vec<Trial>> {
+fn read_policy(path: &Path, pipeline: &Pipeline) -> Result<Policy> {
     let (tensors, meta, made) = weights::read(path, train::KIND)?;
     same_task(path, made.task, pipeline.task)?;
-    let policy = Arc::new(Policy::from_tensors(&tensors, &meta).map_err(|why| Error::input(path, why))?);
-    let horizon_steps = match pipeline.evaluate.horizon_steps {
-        0 => policy.horizon_steps(),
-        given => given,
-    };
-    rollouts(args, pipeline, horizon_steps, context, |index, _| {
-        let sampling = pipeline.evaluate.stochastic.then(|| seed::stream(args.settings.seed, "evaluate.action", index));
-        Ok(Some(Box::new(PolicyController::new(Arc::clone(&policy), sampling)) as Box<dyn Controller>))
-    })
+    Policy::from_tensors(&tensors, &meta).map_err(|why| Error::input(path, why))
 }
 
-fn rollouts<F>(args: &Args, pipeline: &Pipeline, horizon_steps: u32, context: &Context, make: F) -> Result<Vec<Trial>>
-where
-    F: Fn(u64, &Scene) -> Result<Option<Box<dyn Controller>>> + Sync,
-{
-    if let Some(out) = &args.out {
-        [out, &out.with_extension("parquet")].into_iter().try_for_each(|path| atomic::check_place(path))?;
+impl Subject {
+    /// As set; otherwise the policy's own (twice the 95th percentile of its demos), or the demonstrator's patience.
+    fn horizon_steps(&self, pipeline: &Pipeline) -> u32 {
+        match (pipeline.evaluate.horizon_steps, self) {
+            (0, Subject::Planner) => pipeline.simulate.max_steps,
+            (0, Subject::Policy(policy)) => policy.horizon_steps(),
+            (given, _) => given,
+        }
     }
-    let progress = context.console.progress("evaluate", pipeline.evaluate.episodes, "episodes");
-    let trials =
-        Rollouts { pipeline, seed: args.settings.seed, horizon_steps }.run(make, &context.interrupt, |_| progress.step())?;
+
+    /// A controller for one episode; `None` when the demonstrator finds no plan.
+    fn controller(&self, rollouts: &Rollouts, index: u64, scene: &Scene) -> Option<Box<dyn Controller>> {
+        match self {
+            Subject::Planner => {
+                let mut rng = seed::stream(rollouts.seed, "evaluate.search", index);
+                let plan = Planner::new(&rollouts.pipeline.plan).plan(index, scene, &mut rng).ok()?;
+                Some(Box::new(Follower::new(&plan)?))
+            }
+            Subject::Policy(policy) => {
+                let stochastic = rollouts.pipeline.evaluate.stochastic;
+                let sampling = stochastic.then(|| seed::stream(rollouts.seed, "evaluate.action", index));
+                Some(Box::new(PolicyController::new(Arc::clone(policy), sampling)))
+            }
+        }
+    }
+}
+
+fn run_all<K>(rollouts: &Rollouts, subject: &Subject, context: &Context, keep: K) -> Result<Vec<Trial>>
+where
+    K: Fn(&Episode) -> Result<()> + Sync,
+{
+    let progress = context.console.progress("evaluate", rollouts.pipeline.evaluate.episodes, "episodes");
+    let make = |index, scene: &Scene| Ok(subject.controller(rollouts, index, scene));
+    let trials = rollouts.run(make, &context.interrupt, |episode| {
+        progress.step();
+        episode.map_or(Ok(()), &keep)
+    })?;
     let steps: u64 = trials.iter().map(|t| t.steps).sum();
-    progress.finish(&format!(", {steps} control steps, horizon {horizon_steps}"));
+    progress.finish(&format!(", {steps} control steps, horizon {}", rollouts.horizon_steps));
+    Ok(trials)
+}
+
+fn record_all(
+    dir: &Path,
+    rollouts: &Rollouts,
+    subject: &Subject,
+    context: &Context,
+    provenance: &Provenance,
+) -> Result<Vec<Trial>> {
+    let (robot, mut trials) = (urdf(), Vec::new());
+    atomic::write_dir(dir, recording::is_file_name, |fresh| {
+        trials = run_all(rollouts, subject, context, |episode| {
+            recording::write(&fresh.join(recording::file_name(episode.index)), episode, &robot, provenance)
+        })?;
+        Ok(())
+    })?;
     Ok(trials)
 }
 
 /// The table for people.
-fn words(summary: &Summary) -> String {
+fn words(summary: &Summary, trials: &[Trial]) -> String {
     let share = |n: u64| format!("{:.1} %", 100.0 * n as f64 / summary.episodes.max(1) as f64);
     let row = |name: &str, n: u64| vec![name.to_string(), n.to_string(), share(n)];
     let [low, high] = summary.wilson_95.map(|v| 100.0 * v);
@@ -117,6 +163,9 @@ fn words(summary: &Summary) -> String {
     rows.extend(summary.task.condition_names().iter().map(|name| row(&format!("  {name}"), summary.conditions[*name])));
     rows.push(row("failed", summary.episodes - summary.successes));
     rows.extend(summary.failures.iter().filter(|(_, n)| **n > 0).map(|(class, n)| row(&format!("  {class}"), *n)));
+    if trials.iter().any(|t| !t.scene.obstacles.is_empty()) {
+        rows.push(row("hit an obstacle", trials.iter().filter(|t| t.hit_obstacle).count() as u64));
+    }
     format!(
         "{}{}: success {} of {} (95 % interval {low:.1} to {high:.1} %), steps p50 {} p95 {}\n",
         text_table(&["at the end", "episodes", "share"], &rows),

@@ -28,6 +28,8 @@ pub(super) fn resolve(table: Table, origin: &str) -> Result<Pipeline> {
     }
     ordered("scene.spawn_x_m", pipeline.scene.spawn_x_m, origin)?;
     ordered("scene.spawn_y_m", pipeline.scene.spawn_y_m, origin)?;
+    ordered("scene.goal_x_m", pipeline.scene.goal_x_m, origin)?;
+    ordered("scene.goal_y_m", pipeline.scene.goal_y_m, origin)?;
     Ok(pipeline)
 }
 

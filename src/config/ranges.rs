@@ -33,6 +33,8 @@ const MOST_STEPS: f64 = 10_000.0;
 pub(super) const RANGES: &[Range] = &[
     within("scene.spawn_x_m", -WORKSPACE_M, WORKSPACE_M),
     within("scene.spawn_y_m", -WORKSPACE_M, WORKSPACE_M),
+    within("scene.goal_x_m", -WORKSPACE_M, WORKSPACE_M),
+    within("scene.goal_y_m", -WORKSPACE_M, WORKSPACE_M),
     within("scene.base_xy_m", -WORKSPACE_M, WORKSPACE_M),
     within("scene.friction", 0.0, 10.0),
     above("scene.block_mass_kg", 0.0, 10.0),

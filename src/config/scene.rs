@@ -7,13 +7,18 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct SceneSettings {
-    /// Spawn (and goal) area along x, low and high \[m\]. 30 cm in front of the arm, within its reach.
+    /// Spawn area along x, low and high \[m\]: 30 x 30 cm in front of the arm, within its reach (the paper does not state it).
     pub spawn_x_m: [f64; 2],
-    /// Spawn (and goal) area along y, low and high \[m\].
+    /// Spawn area along y, low and high \[m\].
     pub spawn_y_m: [f64; 2],
+    /// Goal area of pick-and-place along x, low and high \[m\].
+    pub goal_x_m: [f64; 2],
+    /// Goal area of pick-and-place along y, low and high \[m\].
+    pub goal_y_m: [f64; 2],
     /// Whether the block's yaw is random (within a quarter turn) instead of 0.
     pub yaw: bool,
-    /// Where the base block of the stack task stands, x y \[m\]: outside the spawn area, within reach.
+    /// Where the base block of the stack task stands, x y \[m\]: within reach, and far enough from the spawn area that the open
+    /// hand fits between: from 0.27 m on it had to grasp some blocks from another side, which no small policy learns well.
     pub base_xy_m: [f64; 2],
     /// Coulomb friction of the block against everything.
     pub friction: f64,
@@ -28,8 +33,10 @@ impl Default for SceneSettings {
         SceneSettings {
             spawn_x_m: [0.32, 0.62],
             spawn_y_m: [-0.15, 0.15],
+            goal_x_m: [0.32, 0.62],
+            goal_y_m: [-0.15, 0.15],
             yaw: false,
-            base_xy_m: [0.45, 0.27],
+            base_xy_m: [0.45, 0.30],
             friction: 1.0,
             block_mass_kg: 0.1,
             obstacles: Vec::new(),

@@ -83,11 +83,16 @@ impl Rollouts<'_> {
     /// Runs all episodes, in parallel on the current thread pool; the result does not depend on the number of threads.
     ///
     /// `make_controller` gives each episode its own controller, from its number and scene; `None` (the demonstrator found no plan)
-    /// counts as never reached, in zero steps. `done` is called once per finished episode, in no particular order.
+    /// counts as never reached, in zero steps. `done` is called once per finished episode, in no particular order, with what was recorded of it.
     ///
     /// # Errors
-    /// The first error of a scene or a controller; [`crate::error::Error::Interrupted`].
-    pub fn run<F>(&self, make_controller: F, interrupt: &Interrupt, done: impl Fn(&Trial) + Sync) -> Result<Vec<Trial>>
+    /// The first error of a scene, a controller or of `done`; [`crate::error::Error::Interrupted`].
+    pub fn run<F>(
+        &self,
+        make_controller: F,
+        interrupt: &Interrupt,
+        done: impl Fn(Option<&Episode>) -> Result<()> + Sync,
+    ) -> Result<Vec<Trial>>
     where
         F: Fn(u64, &Scene) -> Result<Option<Box<dyn Controller>>> + Sync,
     {
@@ -97,16 +102,12 @@ impl Rollouts<'_> {
             .map(|index| {
                 interrupt.check()?;
                 let scene = self.scene(index)?;
-                let trial = match make_controller(index, &scene)? {
-                    Some(mut controller) => {
-                        let noise = seed::stream(self.seed, "evaluate.noise", index);
-                        let mut disturbance = Disturbance::new(&settings, noise);
-                        Trial::of(&run_episode(index, &scene, controller.as_mut(), &mut disturbance, self.horizon_steps))
-                    }
-                    None => unplanned(index, scene),
-                };
-                done(&trial);
-                Ok(trial)
+                let episode = make_controller(index, &scene)?.map(|mut controller| {
+                    let mut disturbance = Disturbance::new(&settings, seed::stream(self.seed, "evaluate.noise", index));
+                    run_episode(index, &scene, controller.as_mut(), &mut disturbance, self.horizon_steps)
+                });
+                done(episode.as_ref())?;
+                Ok(episode.map_or_else(|| unplanned(index, scene), |episode| Trial::of(&episode)))
             })
             .collect()
     }

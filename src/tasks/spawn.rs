@@ -22,10 +22,10 @@ const MAX_DRAWS: usize = 1000;
 pub fn draw_scene(task: Task, settings: &SceneSettings, rng: &mut impl Rng) -> Result<Scene> {
     let base = Pose::from_yaw([settings.base_xy_m[0], settings.base_xy_m[1], REST_HEIGHT_M], 0.0);
     for _ in 0..MAX_DRAWS {
-        let block = Pose::from_yaw(draw_point(settings, rng), draw_yaw(settings, rng));
+        let block = Pose::from_yaw(draw_point(settings.spawn_x_m, settings.spawn_y_m, rng), draw_yaw(settings, rng));
         let context = match task {
             Task::PickUp => Context::None,
-            Task::PickAndPlace => Context::Goal(draw_point(settings, rng)),
+            Task::PickAndPlace => Context::Goal(draw_point(settings.goal_x_m, settings.goal_y_m, rng)),
             Task::Stack => Context::Base(base),
         };
         let apart = |a: [f64; 3], b: [f64; 3], least: f64| f64::hypot(a[0] - b[0], a[1] - b[1]) >= least;
@@ -52,9 +52,9 @@ pub fn draw_scene(task: Task, settings: &SceneSettings, rng: &mut impl Rng) -> R
     )))
 }
 
-fn draw_point(settings: &SceneSettings, rng: &mut impl Rng) -> [f64; 3] {
+fn draw_point(x_m: [f64; 2], y_m: [f64; 2], rng: &mut impl Rng) -> [f64; 3] {
     let mut within = |[low, high]: [f64; 2]| low + (high - low) * rng.random::<f64>();
-    [within(settings.spawn_x_m), within(settings.spawn_y_m), REST_HEIGHT_M]
+    [within(x_m), within(y_m), REST_HEIGHT_M]
 }
 
 fn draw_yaw(settings: &SceneSettings, rng: &mut impl Rng) -> f64 {

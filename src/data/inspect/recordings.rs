@@ -54,9 +54,11 @@ pub(super) fn all(dir: &Path, interrupt: &Interrupt) -> Result<Value> {
         *failures.entry(class.name()).or_default() += 1;
     }
     let failed: Vec<u64> = episodes.iter().filter(|e| !e.success).map(|e| e.index).collect();
+    let hit = |e: &&Episode| e.steps.iter().chain([&e.last]).any(|s| s.contacts.robot_obstacle);
     let rest = json!({
         "task": origin.task,
         "episodes": episodes.len(),
+        "episodes_with_obstacle_contact": episodes.iter().filter(hit).count(),
         "successes": episodes.len() - failed.len(),
         "failures": failures,
         "failed_episodes": failed,
