@@ -63,6 +63,7 @@ fn planning_learning_and_evaluation_stop() {
         long(&run, "train", &["--set", "train.epochs=1000000", "--method", "sc"]),
         long(&run, "evaluate", &["--episodes", "100000"]),
         by_planner,
+        long(&run, "evaluate", &["--episodes", "100000", "--record", &run.name("recordings")]),
     ] {
         interrupted_by("INT", &run, words, SOON);
     }
