@@ -49,7 +49,7 @@ pub struct Context {
 /// Hybrid imitation learning for robot manipulation: from a task's name to an evaluated policy.
 ///
 /// The stages in order: plan, simulate, convert, pretrain, train, evaluate. Each reads files and writes files, by default under
-/// runs/<TASK>/. `make all TASK=stack` runs them all.
+/// runs/TASK/. `make all TASK=stack` runs them all.
 #[derive(Debug, Parser)]
 #[command(
     name = "hilt",

@@ -13,7 +13,7 @@ pub fn write(path: &Path, content: &Value, provenance: &Provenance) -> Result<()
     atomic::write_bytes(path, &encode(path, content, provenance)?)
 }
 
-/// The bytes of the file that [`write`] writes to `path`.
+/// The bytes of the file that [`write()`] writes to `path`.
 ///
 /// # Errors
 /// [`Error::Input`] when `content` is no JSON object.
@@ -28,7 +28,7 @@ pub fn encode(path: &Path, content: &Value, provenance: &Provenance) -> Result<V
     Ok(seal::close(text.into_bytes()))
 }
 
-/// Reads what [`write`] wrote, without the key `hilt`.
+/// Reads what [`write()`] wrote, without the key `hilt`.
 ///
 /// # Errors
 /// [`Error::Input`] when the file is no such JSON, is of another schema version or was changed.

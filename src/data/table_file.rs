@@ -47,7 +47,7 @@ pub fn write(path: &Path, table: &Table, provenance: &Provenance) -> Result<()> 
     atomic::write_bytes(path, &encode(path, table, provenance)?)
 }
 
-/// The bytes of the file that [`write`] writes to `path`.
+/// The bytes of the file that [`write()`] writes to `path`.
 ///
 /// # Errors
 /// [`Error::Input`] when the columns differ in length or share a name.
@@ -65,7 +65,7 @@ pub fn encode(path: &Path, table: &Table, provenance: &Provenance) -> Result<Vec
     parquet_file::of_batch(&batch, provenance).map_err(|e| parquet_file::cannot_encode(path, e))
 }
 
-/// Reads what [`write`] wrote.
+/// Reads what [`write()`] wrote.
 ///
 /// # Errors
 /// [`Error::Input`] when the file is missing its end, damaged, foreign or of another schema version, [`Error::Io`] when it

@@ -32,7 +32,7 @@ pub fn write(path: &Path, kind: &str, tensors: &[NamedTensor], meta: &Value, pro
     atomic::write_bytes(path, &encode(path, kind, tensors, meta, provenance)?)
 }
 
-/// The bytes of the file that [`write`] writes to `path`.
+/// The bytes of the file that [`write()`] writes to `path`.
 ///
 /// # Errors
 /// [`Error::Input`] when a tensor's length does not fit its shape, two share a name, or a number is not finite.

@@ -53,7 +53,7 @@ impl Features {
         features
     }
 
-    /// From known scalings, e.g. those of a file; their widths must be the task's and [`derived_width`]'s.
+    /// From known scalings, e.g. those of a file; their widths must be the task's and `derived_width`'s.
     pub fn from_scaling(task: Task, set: FeatureSet, mask_dq: bool, state: Scaling, derived: Scaling) -> Self {
         let kept = (0..task.state_dim()).filter(|i| !(mask_dq && (JOINTS..2 * JOINTS).contains(i))).collect();
         Features { task, set, mask_dq, kept, state, derived, chain: Chain::default() }

@@ -61,7 +61,7 @@ pub struct Verdict {
     pub conditions: Vec<bool>,
     /// Reward of milestones reached just now.
     pub reward: f64,
-    /// Whether all goal conditions have held for [`HOLD_STEPS`].
+    /// Whether all goal conditions have held for `HOLD_STEPS`.
     pub success: bool,
 }
 

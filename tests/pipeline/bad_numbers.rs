@@ -5,6 +5,7 @@ use arrow_array::cast::AsArray;
 use arrow_array::types::Float32Type;
 use arrow_array::{Array, ArrayRef, FixedSizeListArray, Float32Array, RecordBatch};
 use hilt::data::{recording, seal, table_file, weights};
+use hilt::demo::Step;
 use hilt::robot::urdf::urdf;
 use hilt::table::Values;
 use parquet::arrow::ArrowWriter;
@@ -27,7 +28,8 @@ fn plans_with_a_number_that_is_none_are_refused() {
 
 #[test]
 fn recordings_with_a_number_that_is_none_are_refused() {
-    for harm in [|s: &mut hilt::demo::Step| s.state.dq_rad_s[2] = f64::NAN, |s| s.commanded[4] = f64::INFINITY] {
+    let harms: [fn(&mut Step); 2] = [|s| s.state.dq_rad_s[2] = f64::NAN, |s| s.commanded[4] = f64::INFINITY];
+    for harm in harms {
         let run = Run::finished();
         let path = run.at("recordings/episode-00001.mcap");
         let (mut episode, origin) = recording::read(&path).expect("a recording");

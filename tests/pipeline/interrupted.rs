@@ -53,13 +53,17 @@ fn long(run: &Run, stage: &str, further: &[&str]) -> Vec<String> {
 #[test]
 fn planning_learning_and_evaluation_stop() {
     let run = Run::finished();
+    let policy = run.name("policy.safetensors");
+    let by_planner = long(&run, "evaluate", &["--episodes", "100000"]);
+    let by_planner = by_planner.into_iter().map(|w| if w == policy { "planner".into() } else { w }).collect();
     for words in [
         long(&run, "plan", &["--episodes", "100000"]),
         long(&run, "pretrain", &["--set", "pretrain.epochs=1000000"]),
         long(&run, "train", &["--set", "train.warm_start_updates=10000000"]),
         long(&run, "train", &["--set", "train.epochs=1000000", "--method", "sc"]),
         long(&run, "evaluate", &["--episodes", "100000"]),
-        long(&run, "evaluate", &["--episodes", "100000", "--policy", "planner"]),
+        by_planner,
+        long(&run, "evaluate", &["--episodes", "100000", "--record", &run.name("recordings")]),
     ] {
         interrupted_by("INT", &run, words, SOON);
     }

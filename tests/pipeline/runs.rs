@@ -1,6 +1,5 @@
 //! Tiny runs of all stages, and what must hold of a stage that refuses.
 
-use hilt::data::provenance::hash_path;
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -152,11 +151,6 @@ pub fn contents(root: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
         }
     }
     found
-}
-
-/// Content hash of a file or directory.
-pub fn hash(path: &Path) -> String {
-    hash_path(path).expect("readable")
 }
 
 /// Words of the process.

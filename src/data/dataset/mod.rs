@@ -76,7 +76,7 @@ pub fn write(root: &Path, task: Task, episodes: &[DatasetEpisode], provenance: &
 /// there is no validation root.
 ///
 /// # Errors
-/// As [`write`]; [`Error::Interrupted`].
+/// As [`write()`]; [`Error::Interrupted`].
 pub fn write_split(
     parent: &Path,
     task: Task,
