@@ -41,7 +41,13 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome> {
         })
         .collect::<Result<_>>()?;
     progress.finish("");
-    let (kept, outcome) = dropped::keep("convert", read, ADVICE, &context.console)?;
+    let (mut kept, outcome) = dropped::keep("convert", read, ADVICE, &context.console)?;
+    let wanted = pipeline.convert.demos as usize;
+    if kept.len() < wanted {
+        context.console.say(&format!("convert: {} demos where {wanted} are wanted; raise plan.episodes for more", kept.len()));
+    } else if wanted > 0 {
+        kept.truncate(wanted);
+    }
 
     let (train, validation) = dataset::split(kept.len(), pipeline.convert.train_per_validation, args.settings.seed);
     let pick =

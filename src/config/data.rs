@@ -10,11 +10,13 @@ pub struct ConvertSettings {
     pub train_per_validation: u32,
     /// Whether failed episodes stay in the dataset.
     pub keep_failed: bool,
+    /// Demos to take, the first that succeeded; 0 = all. Plan some more than this when pulses make some fail.
+    pub demos: u64,
 }
 
 impl Default for ConvertSettings {
     fn default() -> Self {
-        ConvertSettings { train_per_validation: 10, keep_failed: false }
+        ConvertSettings { train_per_validation: 10, keep_failed: false, demos: 0 }
     }
 }
 

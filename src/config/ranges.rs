@@ -51,6 +51,7 @@ pub(super) const RANGES: &[Range] = &[
     within("simulate.pulses.steps", 1.0, MOST_STEPS),
     within("simulate.pulses.sigma_rad_s", 0.0, 10.0),
     within("convert.train_per_validation", 1.0, MOST_EPISODES),
+    within("convert.demos", 0.0, MOST_EPISODES),
     within("evaluate.episodes", 1.0, MOST_EPISODES),
     within("evaluate.horizon_steps", 0.0, MOST_STEPS),
 ];
