@@ -2,6 +2,7 @@
 
 mod bad_input;
 mod bad_numbers;
+mod demos;
 mod fixtures;
 mod full_disk;
 mod interrupted;
