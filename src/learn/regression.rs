@@ -2,7 +2,7 @@
 
 use super::corpus::{Samples, row};
 use super::shards;
-use crate::nn::{Mlp, Pass};
+use crate::nn::{Mlp, Pass, panels_of};
 use rayon::prelude::*;
 
 /// Where Huber's function turns from a parabola into a line, in standard deviations.
@@ -58,31 +58,34 @@ impl Regression {
 impl Shard {
     fn run(&mut self, net: &Mlp, samples: &Samples, rows: &[usize], loss: &Loss, learn: bool) {
         let (inputs, outputs) = (net.inputs(), net.outputs());
-        self.pass.reserve(net, rows.len());
+        let panels = panels_of(rows.len());
+        self.pass.reserve(net, panels);
         for (slot, r) in rows.iter().enumerate() {
-            self.pass.input[slot * inputs..(slot + 1) * inputs].copy_from_slice(row(&samples.inputs, inputs, *r));
+            self.pass.input.write_row(slot, row(&samples.inputs, inputs, *r));
         }
-        net.forward(&mut self.pass, 0..rows.len());
+        self.pass.input.clear_tail(rows.len());
+        net.forward(&mut self.pass, 0..panels);
         self.loss = 0.0;
         for (slot, r) in rows.iter().enumerate() {
             let mut sum = 0.0f32;
             for (i, target) in row(&samples.targets, outputs, *r).iter().enumerate() {
-                let error = self.pass.output[slot * outputs + i] - target;
+                let error = self.pass.output.get(slot, i) - target;
                 let (value, slope) = if loss.huber && error.abs() > HUBER_KNEE {
                     (HUBER_KNEE * (2.0 * error.abs() - HUBER_KNEE), 2.0 * HUBER_KNEE * error.signum())
                 } else {
                     (error * error, 2.0 * error)
                 };
                 sum += loss.weights[i] * value;
-                self.pass.d_output[slot * outputs + i] = loss.scale * loss.weights[i] * slope;
+                self.pass.d_output.set(slot, i, loss.scale * loss.weights[i] * slope);
             }
             self.loss += f64::from(loss.scale * sum);
         }
         if learn {
-            net.backward(&mut self.pass, 0..rows.len());
+            self.pass.d_output.clear_tail(rows.len());
+            net.backward(&mut self.pass, 0..panels);
             self.gradient.clear();
             self.gradient.resize(net.params().len(), 0.0);
-            net.add_gradient(&self.pass, 0..rows.len(), &mut self.gradient);
+            net.add_gradient(&mut self.pass, 0..panels, &mut self.gradient);
         }
     }
 }
