@@ -266,7 +266,9 @@ fn step_by_step(world: &World, gradient: &mut [f32]) -> f64 {
             let (features, hand) = (dynamics.features(), dynamics.features().hand(s));
             features.backward(s, &hand, f.input.panel(t), f.d_input.panel(t), &mut carry);
         }
-        policy.net.add_gradient(&mut pi, 0..steps, gradient);
+        policy.net.begin_gradient(&mut pi);
+        policy.net.add_gradient(&mut pi, 0..steps);
+        policy.net.finish_gradient(&pi, gradient);
         at += steps;
     }
     l_sc

@@ -98,7 +98,9 @@ impl Rollout {
             self.retrace(self.depth(j), policy, dynamics, batch, choices);
         }
         let later = self.hands.len() - panels_of(self.segments.len());
-        policy.net.add_gradient(&mut self.policy, 0..later, &mut self.gradient);
+        policy.net.begin_gradient(&mut self.policy);
+        policy.net.add_gradient(&mut self.policy, 0..later);
+        policy.net.finish_gradient(&self.policy, &mut self.gradient);
     }
 
     fn prepare(&mut self, policy: &Policy, dynamics: &Dynamics, batch: Batch) {

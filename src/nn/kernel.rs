@@ -107,9 +107,15 @@ unsafe fn tiles<T: Vector>(result: &mut [Lanes], width: usize, x: &[Lanes], dept
 }
 
 /// 0..n in the fewest parts of at most `most`, as even as can be.
+#[inline(always)]
 fn parts(n: usize, most: usize) -> impl Iterator<Item = std::ops::Range<usize>> {
     let count = n.div_ceil(most);
-    (0..count).map(move |i| i * n / count..(i + 1) * n / count)
+    let (least, longer) = (n / count.max(1), n % count.max(1));
+    let mut start = 0;
+    (0..count).map(move |i| {
+        let end = start + least + usize::from(i < longer);
+        std::mem::replace(&mut start, end)..end
+    })
 }
 
 /// y <- tanh(y), in place.
@@ -144,7 +150,8 @@ fn tanh_backward_on(path: Path, d: &mut [Lanes], y: &[Lanes]) {
     }
 }
 
-/// Panels of `entries` entries turned round: to\[i\]\[r\] holds entries 8 i to 8 i + 7 of sample r, 0 past the last entry.
+/// Panels of `entries` entries turned round: to\[i\]\[r\] holds entries 8 i to 8 i + 7 of sample r. After the last entry comes a 1, which
+/// is what a bias is the weight of, and then zeros.
 ///
 /// # Panics
 /// When a length does not fit.
@@ -156,7 +163,7 @@ fn transpose_on(path: Path, to: &mut [Lanes], from: &[Lanes], entries: usize) {
     let panels = from.len() / entries;
     assert_eq!(
         (from.len(), to.len()),
-        (panels * entries, panels * LANES * entries.div_ceil(LANES)),
+        (panels * entries, panels * LANES * (entries + 1).div_ceil(LANES)),
         "panels of {entries} entries"
     );
     // SAFETY: as above.
@@ -168,6 +175,21 @@ fn transpose_on(path: Path, to: &mut [Lanes], from: &[Lanes], entries: usize) {
         }
     }
 }
+
+/// Asks the processor to bring these into its cache while it works on something else; without effect on any result.
+pub fn prefetch(soon: &[Lanes]) {
+    #[cfg(target_arch = "x86_64")]
+    for line in soon.chunks(CACHE_LINE / size_of::<Lanes>()) {
+        // SAFETY: SSE belongs to x86-64, and a prefetch reads nothing.
+        unsafe { std::arch::x86_64::_mm_prefetch::<{ std::arch::x86_64::_MM_HINT_T0 }>(line.as_ptr().cast()) }
+    }
+    #[cfg(not(target_arch = "x86_64"))]
+    let _ = soon;
+}
+
+/// Bytes that a processor fetches at once.
+#[cfg(target_arch = "x86_64")]
+const CACHE_LINE: usize = 64;
 
 /// Which compilation runs.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -391,13 +413,13 @@ unsafe fn tanh_backward_all<T: Vector>(d: &mut [Lanes], y: &[Lanes]) {
 unsafe fn transpose_all<T: Vector>(to: &mut [Lanes], from: &[Lanes], entries: usize) {
     let samples = from.len() / entries * LANES;
     for (p, panel) in from.chunks_exact(entries).enumerate() {
-        for (i, part) in panel.chunks(LANES).enumerate() {
-            let to = &mut to[i * samples + p * LANES..][..LANES];
+        for (i, to) in to.chunks_exact_mut(samples).enumerate() {
             // SAFETY: all are borrowed; the rest is the caller's.
             unsafe {
-                let load = |k: usize| part.get(k).map_or(T::splat(0.0), |at| T::load(at));
+                let part = &panel[i * LANES..entries.min((i + 1) * LANES)];
+                let load = |k: usize| part.get(k).map_or(T::splat(if k == part.len() { 1.0 } else { 0.0 }), |at| T::load(at));
                 let turned = T::transposed(std::array::from_fn(load));
-                to.iter_mut().zip(turned).for_each(|(to, v)| v.store(to));
+                to[p * LANES..].iter_mut().zip(turned).for_each(|(to, v)| v.store(to));
             }
         }
     }
@@ -511,6 +533,7 @@ mod avx2 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::cmp::Ordering;
 
     fn paths() -> Vec<Path> {
         let mut paths = vec![Path::Portable];
@@ -609,10 +632,14 @@ mod tests {
             for (panels, entries) in [(1, 8), (2, 11), (3, 5), (2, 16)] {
                 let from = lanes(panels * entries, 7);
                 let samples = panels * LANES;
-                let mut to = vec![Lanes::splat(9.0); samples * entries.div_ceil(LANES)];
+                let mut to = vec![Lanes::splat(9.0); samples * (entries + 1).div_ceil(LANES)];
                 transpose_on(path, &mut to, &from, entries);
-                for (r, i) in (0..samples).flat_map(|r| (0..entries.next_multiple_of(LANES)).map(move |i| (r, i))) {
-                    let expected = if i < entries { from[r / LANES * entries + i].0[r % LANES] } else { 0.0 };
+                for (r, i) in (0..samples).flat_map(|r| (0..(entries + 1).next_multiple_of(LANES)).map(move |i| (r, i))) {
+                    let expected = match i.cmp(&entries) {
+                        Ordering::Less => from[r / LANES * entries + i].0[r % LANES],
+                        Ordering::Equal => 1.0,
+                        Ordering::Greater => 0.0,
+                    };
                     assert_eq!(to[i / LANES * samples + r].0[i % LANES], expected, "{path:?}, sample {r}, entry {i}");
                 }
             }

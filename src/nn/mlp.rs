@@ -2,9 +2,9 @@
 
 use super::Pass;
 use super::activation::Activation;
-use super::kernel::{Coefficients, Start, product};
+use super::kernel::{Coefficients, Start, prefetch, product};
 use super::lanes::Lanes;
-use super::pass::GRADIENT_PANELS;
+use super::pass::BLOCK_PANELS;
 use rand::{Rng, RngExt};
 use std::ops::{Deref, DerefMut, Range};
 
@@ -19,9 +19,10 @@ pub struct Mlp {
 }
 
 /// Panels that go through all layers before the next do: two layers of them fit into a core's first cache, beside the weights.
-const BLOCK_PANELS: usize = 2;
+const STEP_PANELS: usize = 2;
 
-fn blocks(panels: Range<usize>, size: usize) -> impl Iterator<Item = Range<usize>> {
+/// A range in blocks of `size`.
+pub fn blocks(panels: Range<usize>, size: usize) -> impl Iterator<Item = Range<usize>> {
     let end = panels.end;
     panels.step_by(size).map(move |from| from..end.min(from + size))
 }
@@ -122,7 +123,7 @@ impl Mlp {
 
     /// `pass.output` of these panels from `pass.input`.
     pub fn forward(&self, pass: &mut Pass, panels: Range<usize>) {
-        blocks(panels, BLOCK_PANELS).for_each(|block| self.forward_block(pass, &block));
+        blocks(panels, STEP_PANELS).for_each(|block| self.forward_block(pass, &block));
     }
 
     fn forward_block(&self, pass: &mut Pass, panels: &Range<usize>) {
@@ -143,16 +144,17 @@ impl Mlp {
 
     /// Gradients of the hidden layers of these panels from `pass.d_output`; they stay in the workspace for the two calls below.
     pub fn backward(&self, pass: &mut Pass, panels: Range<usize>) {
-        blocks(panels, BLOCK_PANELS).for_each(|block| self.backward_block(pass, &block));
+        blocks(panels, STEP_PANELS).for_each(|block| self.backward_block(pass, &block));
     }
 
     fn backward_block(&self, pass: &mut Pass, panels: &Range<usize>) {
         for layer in (1..self.layers()).rev() {
             let (below, above) = pass.d_hidden.split_at_mut(layer);
             let dy = if layer + 1 == self.layers() { &pass.d_output } else { &above[0] };
-            let dx = below[layer - 1].span_mut(panels);
+            let (dx, y) = (below[layer - 1].span_mut(panels), pass.hidden[layer - 1].span(panels));
+            prefetch(y);
             self.input_gradient(layer, dx, dy.span(panels));
-            self.activation.backward(dx, pass.hidden[layer - 1].span(panels));
+            self.activation.backward(dx, y);
         }
     }
 
@@ -168,22 +170,31 @@ impl Mlp {
         product(dx, self.widths[layer], dy, self.widths[layer + 1], transposed, Start::Zero);
     }
 
-    /// Adds the parameters' gradient over these panels to `gradient`, after [`Mlp::backward`].
+    /// Starts the sum of the parameters' gradient in the workspace.
+    pub fn begin_gradient(&self, pass: &mut Pass) {
+        pass.sums.begin(&self.widths);
+    }
+
+    /// Adds these panels to the sum, after [`Mlp::backward`].
+    pub fn add_gradient(&self, pass: &mut Pass, panels: Range<usize>) {
+        for block in blocks(panels, BLOCK_PANELS) {
+            for layer in 0..self.layers() {
+                let (inputs, outputs) = (self.widths[layer], self.widths[layer + 1]);
+                let x = if layer == 0 { &pass.input } else { &pass.hidden[layer - 1] };
+                let dy = if layer + 1 == self.layers() { &pass.d_output } else { &pass.d_hidden[layer] };
+                pass.sums.add(layer, x.span(&block), inputs, dy.span(&block), outputs);
+            }
+        }
+    }
+
+    /// Adds the sum to `gradient`, laid out as the parameters.
     ///
     /// # Panics
     /// When `gradient` is shorter than the parameters.
-    pub fn add_gradient(&self, pass: &mut Pass, panels: Range<usize>, gradient: &mut [f32]) {
+    pub fn finish_gradient(&self, pass: &Pass, gradient: &mut [f32]) {
         for layer in 0..self.layers() {
-            let (inputs, outputs) = (self.widths[layer], self.widths[layer + 1]);
-            let x = if layer == 0 { &pass.input } else { &pass.hidden[layer - 1] };
-            let dy = if layer + 1 == self.layers() { &pass.d_output } else { &pass.d_hidden[layer] };
-            pass.sums.begin(inputs, outputs);
-            for block in blocks(panels.clone(), GRADIENT_PANELS) {
-                pass.sums.add(x.span(&block), inputs, dy.span(&block), outputs);
-            }
             let (weights, biases) = self.layer_ranges(layer);
-            let (d_weights, d_bias) = gradient[weights.start..biases.end].split_at_mut(weights.len());
-            pass.sums.add_to(d_weights, d_bias);
+            pass.sums.add_to(layer, &mut gradient[weights.start..biases.end], self.widths[layer + 1]);
         }
     }
 }
@@ -243,8 +254,10 @@ mod tests {
             mlp.backward(&mut pass, 2..panels);
             mlp.backward_input(&mut pass, 0..panels);
             let mut gradient = vec![0.0; mlp.params().len()];
-            mlp.add_gradient(&mut pass, 0..1, &mut gradient);
-            mlp.add_gradient(&mut pass, 1..panels, &mut gradient);
+            mlp.begin_gradient(&mut pass);
+            mlp.add_gradient(&mut pass, 0..1);
+            mlp.add_gradient(&mut pass, 1..panels);
+            mlp.finish_gradient(&pass, &mut gradient);
             let h = 2e-3f32;
             let check = |analytic: f32, plus: f64, minus: f64, what: &str| {
                 let numeric = (plus - minus) / f64::from(2.0 * h);

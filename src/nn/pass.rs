@@ -2,10 +2,11 @@
 
 use super::Mlp;
 use super::kernel::{Coefficients, Start, product, transpose};
-use super::lanes::{LANES, Lanes, Panels};
+use super::lanes::{LANES, Lanes, Panels, panels_of};
 
-/// Panels of samples whose weight gradient is summed in one go: 16 of 100 entries, transposed, take 50 kB, a tenth of a core's cache.
-pub(super) const GRADIENT_PANELS: usize = 16;
+/// Panels that had best go through forward, backward and the gradient before the next do: their activations then wait in a core's second
+/// cache (200 to 400 kB for a network of three times 100), and the sums of the gradient still stay in registers for long.
+pub const BLOCK_PANELS: usize = 12;
 
 /// Activations and their gradients: the workspace of one thread. Lanes that hold no row must hold finite inputs and zeros in `d_output`.
 #[derive(Clone, Debug, Default)]
@@ -20,7 +21,7 @@ pub struct Pass {
     pub d_input: Panels,
     pub(super) hidden: Vec<Panels>,
     pub(super) d_hidden: Vec<Panels>,
-    pub(super) sums: WeightSums,
+    pub(super) sums: GradientSums,
 }
 
 impl Pass {
@@ -47,43 +48,40 @@ impl Pass {
     }
 }
 
-/// A layer's weight gradient while it is summed: lanes run over the layer's inputs, so that it is a product like the others.
+/// A network's gradient while it is summed. Per layer, lanes run over the inputs, so that x^T dy is a product like the others; a bias is
+/// the weight of one more input, which is always 1.
 #[derive(Clone, Debug, Default)]
-pub(super) struct WeightSums {
-    /// Samples with inputs for lanes: \[inputs / 8\]\[samples\].
+pub(super) struct GradientSums {
+    /// Samples with inputs for lanes: \[(inputs + 1) / 8\]\[samples\].
     x: Vec<Lanes>,
-    /// Sums so far: \[inputs / 8\]\[outputs\].
-    d_weights: Vec<Lanes>,
-    /// Sums of dy, one lane a row of its panel.
-    d_bias: Vec<Lanes>,
+    /// Sums so far, layer by layer: \[(inputs + 1) / 8\]\[outputs\].
+    layers: Vec<Vec<Lanes>>,
 }
 
-impl WeightSums {
-    /// Starts the sums of a layer.
-    pub fn begin(&mut self, inputs: usize, outputs: usize) {
-        self.d_weights.clear();
-        self.d_weights.resize(inputs.div_ceil(LANES) * outputs, Lanes::default());
-        self.d_bias.clear();
-        self.d_bias.resize(outputs, Lanes::default());
+impl GradientSums {
+    /// Starts the sums of layers of these widths.
+    pub fn begin(&mut self, widths: &[usize]) {
+        self.layers.resize_with(widths.len() - 1, Vec::new);
+        for (sums, pair) in self.layers.iter_mut().zip(widths.windows(2)) {
+            sums.clear();
+            sums.resize(panels_of(pair[0] + 1) * pair[1], Lanes::default());
+        }
     }
 
-    /// Adds x^T dy to the sums, from panels of `inputs` and of `outputs` entries.
-    pub fn add(&mut self, x: &[Lanes], inputs: usize, dy: &[Lanes], outputs: usize) {
+    /// Adds x^T dy to a layer's sums, from panels of `inputs` and of `outputs` entries.
+    pub fn add(&mut self, layer: usize, x: &[Lanes], inputs: usize, dy: &[Lanes], outputs: usize) {
         let samples = x.len() / inputs * LANES;
-        self.x.resize(inputs.div_ceil(LANES) * samples, Lanes::default());
+        self.x.resize(panels_of(inputs + 1) * samples, Lanes::default());
         transpose(&mut self.x, x, inputs);
-        product(&mut self.d_weights, outputs, &self.x, samples, Coefficients::Samples(dy), Start::Result);
-        dy.chunks_exact(outputs).for_each(|dy| self.d_bias.iter_mut().zip(dy).for_each(|(sum, d)| *sum += *d));
+        product(&mut self.layers[layer], outputs, &self.x, samples, Coefficients::Samples(dy), Start::Result);
     }
 
-    /// Adds the sums to a layer's part of the gradient, weights inputs x outputs.
-    pub fn add_to(&self, d_weights: &mut [f32], d_bias: &mut [f32]) {
-        let outputs = d_bias.len();
-        for (i, sums) in d_weights.chunks_mut(LANES * outputs).zip(self.d_weights.chunks_exact(outputs)) {
-            for (l, row) in i.chunks_exact_mut(outputs).enumerate() {
+    /// Adds a layer's sums to its part of the gradient: weights inputs x outputs, then biases.
+    pub fn add_to(&self, layer: usize, gradient: &mut [f32], outputs: usize) {
+        for (rows, sums) in gradient.chunks_mut(LANES * outputs).zip(self.layers[layer].chunks_exact(outputs)) {
+            for (l, row) in rows.chunks_exact_mut(outputs).enumerate() {
                 row.iter_mut().zip(sums).for_each(|(d, sum)| *d += sum.0[l]);
             }
         }
-        d_bias.iter_mut().zip(&self.d_bias).for_each(|(d, sum)| *d += sum.sum());
     }
 }
