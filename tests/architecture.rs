@@ -111,13 +111,12 @@ fn modules_import_only_from_their_left() {
 
 #[test]
 fn only_their_homes_know_the_big_crates() {
-    let homes: [(&str, &[&str]); 8] = [
+    let homes: [(&str, &[&str]); 7] = [
         ("rapier3d", &["sim"]),
         ("mcap", &["data"]),
         ("arrow_array", &["data"]),
         ("parquet", &["data"]),
         ("safetensors", &["data"]),
-        ("gemm", &["nn"]),
         ("clap", &["cmd", "main"]),
         ("indicatif", &["cmd"]),
     ];

@@ -4,7 +4,7 @@ use super::corpus::{Samples, row};
 use super::policy::Policy;
 use super::shards;
 use crate::config::{ActionChoice, Convergence, Objective, TrainSettings};
-use crate::nn::{Pass, gaussian};
+use crate::nn::{BLOCK_PANELS, Pass, blocks, gaussian, panels_of};
 use crate::state::JOINTS;
 use rand::Rng;
 use rand_distr::{Distribution, StandardNormal};
@@ -80,12 +80,13 @@ pub fn behavior_cloning(policy: &Policy, batch: Batch, choices: &Choices, rng: &
     let noise = &work.noise;
     work.shards[..work.active].par_iter_mut().enumerate().for_each(|(i, shard)| {
         let part = shards::range(rows, shards::count(rows), i);
-        shard.pass.reserve(&policy.net, part.len());
+        let panels = panels_of(part.len());
+        shard.pass.reserve(&policy.net, panels);
         for (slot, r) in part.clone().enumerate() {
-            let width = policy.net.inputs();
-            shard.pass.input[slot * width..(slot + 1) * width].copy_from_slice(row(&batch.samples.inputs, width, batch.rows[r]));
+            shard.pass.input.write_row(slot, row(&batch.samples.inputs, policy.net.inputs(), batch.rows[r]));
         }
-        policy.net.forward(&mut shard.pass, 0..part.len());
+        shard.pass.input.clear_tail(part.len());
+        policy.net.forward(&mut shard.pass, 0..panels);
         let eps = if samples { &noise[part.start * JOINTS..part.end * JOINTS] } else { &[] };
         shard.losses(policy, batch, &batch.rows[part], eps, choices);
     });
@@ -117,7 +118,7 @@ impl Shard {
             let eps = noise.get(at..at + JOINTS);
             let (mut loss, mut error2) = (0.0f32, 0.0f32);
             for i in 0..JOINTS {
-                let residual = self.pass.output[at + i] - label[i];
+                let residual = self.pass.output.get(slot, i) - label[i];
                 let shift = match (choices.action, eps) {
                     (ActionChoice::Sample, Some(eps)) => sigma[i] * eps[i],
                     _ => 0.0,
@@ -149,7 +150,9 @@ impl Workspace {
             cloned.d_conv += shard.agreement / rows as f64;
             shards::add_scaled(&mut residual2, &shard.residual2, 1.0 / rows as f32);
             shards::add_scaled(&mut self.d_log_std, &shard.d_log_std, 1.0);
-            self.mean.extend_from_slice(&shard.pass.output[..shard.d_bc.len()]);
+            for slot in 0..shard.d_bc.len() / JOINTS {
+                self.mean.extend((0..JOINTS).map(|i| shard.pass.output.get(slot, i)));
+            }
         }
         if action == ActionChoice::Mean {
             gaussian::add_nll_gradient(&policy.log_std, &residual2, &mut self.d_log_std);
@@ -177,16 +180,19 @@ pub fn policy_gradient(
     let mut parts: [Option<_>; shards::MAX_SHARDS] = collect_array(parts);
     parts.par_iter_mut().flatten().for_each(|(shard, d_first)| {
         let rows = shard.d_bc.len() / JOINTS;
-        for (d, bc) in shard.pass.d_output.iter_mut().zip(&shard.d_bc) {
-            *d = bc_weight * bc;
+        for (at, bc) in shard.d_bc.iter().enumerate() {
+            let first = d_first.map_or(0.0, |d_first| first_weight * d_first[at]);
+            shard.pass.d_output.set(at / JOINTS, at % JOINTS, bc_weight * bc + first);
         }
-        if let Some(d_first) = d_first {
-            shards::add_scaled(&mut shard.pass.d_output, d_first, first_weight);
+        shard.pass.d_output.clear_tail(rows);
+        policy.net.begin_gradient(&mut shard.pass);
+        for block in blocks(0..panels_of(rows), BLOCK_PANELS) {
+            policy.net.backward(&mut shard.pass, block.clone());
+            policy.net.add_gradient(&mut shard.pass, block);
         }
-        policy.net.backward(&mut shard.pass, 0..rows);
         shard.gradient.clear();
         shard.gradient.resize(policy.net.params().len(), 0.0);
-        policy.net.add_gradient(&shard.pass, 0..rows, &mut shard.gradient);
+        policy.net.finish_gradient(&shard.pass, &mut shard.gradient);
     });
     gradient.fill(0.0);
     work.shards[..work.active].iter().for_each(|shard| shards::add_scaled(gradient, &shard.gradient, 1.0));

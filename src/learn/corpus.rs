@@ -86,10 +86,8 @@ impl Corpus {
     /// What behavior cloning learns: the policy's inputs and the standardised commanded actions.
     pub fn policy_samples(&self, policy: &Policy) -> Samples {
         let (features, width) = (policy.features(), policy.features().width());
-        let mut inputs = vec![0.0; self.rows() * width];
-        for (r, out) in inputs.chunks_exact_mut(width).enumerate() {
-            features.forward(self.state(r), &features.hand(self.state(r)), out);
-        }
+        let mut inputs = Vec::with_capacity(self.rows() * width);
+        features.for_each(&self.states, |row| inputs.extend_from_slice(row));
         let scaling = policy.action_scaling();
         let targets = self.commanded.iter().enumerate().map(|(i, a)| scaling.apply(i % JOINTS, *a)).collect();
         Samples { inputs, targets }
@@ -98,10 +96,14 @@ impl Corpus {
     /// What the dynamics network learns from the observed transitions: its inputs, and what it must add, standardised.
     pub fn model_samples(&self, dynamics: &Dynamics) -> Samples {
         let width = dynamics.inputs();
-        let (mut inputs, mut targets) = (vec![0.0; self.rows() * width], vec![0.0; self.rows() * BASE_DIM]);
+        let (mut inputs, mut targets) = (Vec::with_capacity(self.rows() * width), vec![0.0; self.rows() * BASE_DIM]);
+        dynamics.features().for_each(&self.states, |seen| {
+            let action = row(&self.executed, JOINTS, inputs.len() / width);
+            inputs.extend_from_slice(seen);
+            inputs.extend(action.iter().enumerate().map(|(i, a)| dynamics.action_scaling().apply(i, *a)));
+        });
         for r in 0..self.rows() {
             let (state, action) = (self.state(r), row(&self.executed, JOINTS, r));
-            dynamics.write_inputs(state, action, &mut inputs[r * width..(r + 1) * width]);
             let target = &mut targets[r * BASE_DIM..(r + 1) * BASE_DIM];
             dynamics.residual_target(state, action, row(&self.next, BASE_DIM, r), target);
         }

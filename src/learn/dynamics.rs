@@ -5,7 +5,7 @@ use super::features::Features;
 use super::scaling::Scaling;
 use super::weights::{Reader, push_features, push_network, push_scaling};
 use crate::config::{PretrainSettings, Structure};
-use crate::nn::{Mlp, Pass};
+use crate::nn::{Lanes, Mlp, Pass};
 use crate::state::{Action, BASE_DIM, CONTROL_DT_S, JOINTS};
 use crate::tasks::Task;
 use crate::tensor::NamedTensor;
@@ -82,38 +82,40 @@ impl Dynamics {
         self.features.width() + JOINTS
     }
 
-    /// The network's inputs for a state and an action \[rad/s\].
-    pub(super) fn write_inputs(&self, state: &[f32], action: &[f32], out: &mut [f32]) {
+    /// The network's inputs for a panel of states and actions \[rad/s\].
+    pub(super) fn write_inputs(&self, state: &[Lanes], action: &[Lanes], out: &mut [Lanes]) {
         let (seen, given) = out.split_at_mut(self.features.width());
         self.features.forward(state, &self.features.hand(state), seen);
         self.write_action(action, given);
     }
 
     /// The last nine inputs.
-    pub(super) fn write_action(&self, action: &[f32], given: &mut [f32]) {
-        given.iter_mut().zip(action).enumerate().for_each(|(i, (slot, a))| *slot = self.action.apply(i, *a));
+    pub(super) fn write_action(&self, action: &[Lanes], given: &mut [Lanes]) {
+        given.iter_mut().zip(action).enumerate().for_each(|(i, (slot, a))| *slot = a.map(|a| self.action.apply(i, a)));
     }
 
-    /// The change that is known before learning.
-    fn known_change(&self, i: usize, state: &[f32], action: &[f32]) -> f32 {
+    /// What entry `i` of a state is known to become before learning; `action` is its joint's.
+    #[inline]
+    fn known_next(&self, i: usize, state: f32, action: f32) -> f32 {
         match self.structure {
-            Structure::Kinematic if i < JOINTS => DT_S * action[i],
-            Structure::Kinematic if i < 2 * JOINTS => action[i - JOINTS] - state[i],
-            _ => 0.0,
+            Structure::Kinematic if i < JOINTS => state + DT_S * action,
+            Structure::Kinematic if i < 2 * JOINTS => action,
+            _ => state,
         }
     }
 
-    /// The next state's changing entries from the network's output.
-    pub(super) fn write_next(&self, state: &[f32], action: &[f32], output: &[f32], next: &mut [f32]) {
+    /// The next states' changing entries from the network's output.
+    pub(super) fn write_next(&self, state: &[Lanes], action: &[Lanes], output: &[Lanes], next: &mut [Lanes]) {
         for (i, slot) in next.iter_mut().enumerate() {
-            *slot = state[i] + self.known_change(i, state, action) + self.residual.undo(i, output[i]);
+            let (state, action, output) = (state[i].0, action[i % JOINTS].0, output[i].0);
+            *slot = Lanes(std::array::from_fn(|l| self.known_next(i, state[l], action[l]) + self.residual.undo(i, output[l])));
         }
     }
 
     /// What the network must put out for the observed `next`.
     pub(super) fn residual_target(&self, state: &[f32], action: &[f32], next: &[f32], target: &mut [f32]) {
         for (i, slot) in target.iter_mut().enumerate() {
-            *slot = self.residual.apply(i, next[i] - state[i] - self.known_change(i, state, action));
+            *slot = self.residual.apply(i, next[i] - self.known_next(i, state[i], action[i % JOINTS]));
         }
     }
 
@@ -123,13 +125,19 @@ impl Dynamics {
     /// When the row is not the task's.
     pub fn predict(&self, state_row: &[f32], action: &Action) -> Vec<f32> {
         assert_eq!(state_row.len(), self.task.state_dim(), "the row of another task than {}", self.task);
-        let action = action.map(|v| v as f32);
-        let mut pass = Pass::new(&self.net, 1);
-        self.write_inputs(state_row, &action, &mut pass.input);
-        self.net.forward(&mut pass, 0..1);
-        let mut next = state_row.to_vec();
-        self.write_next(state_row, &action, &pass.output, &mut next[..BASE_DIM]);
-        next
+        let action = action.map(|v| Lanes::splat(v as f32));
+        let mut state: Vec<Lanes> = state_row.iter().map(|v| Lanes::splat(*v)).collect();
+        self.step(&mut state, &action, &mut Pass::new(&self.net, 1));
+        state.iter().map(|entry| entry.0[0]).collect()
+    }
+
+    /// A panel of states becomes the next ones; `pass` has room for one panel.
+    pub(super) fn step(&self, state: &mut [Lanes], action: &[Lanes], pass: &mut Pass) {
+        self.write_inputs(state, action, pass.input.panel_mut(0));
+        self.net.forward(pass, 0..1);
+        let mut next = [Lanes::default(); BASE_DIM];
+        self.write_next(state, action, pass.output.panel(0), &mut next);
+        state[..BASE_DIM].copy_from_slice(&next);
     }
 
     /// All arrays.
@@ -204,10 +212,12 @@ mod tests {
         let corpus = Corpus::new(&demos(Task::PickUp, 2, 20, 0), "training").expect("demos");
         let dynamics = Dynamics::new(&corpus, &PretrainSettings::default(), &mut stream(0, "test", 0));
         let samples = corpus.model_samples(&dynamics);
-        let mut next = vec![0.0; BASE_DIM];
-        dynamics.write_next(corpus.state(7), &corpus.executed[63..72], &samples.targets[7 * BASE_DIM..8 * BASE_DIM], &mut next);
+        let mut next = [Lanes::default(); BASE_DIM];
+        let splat = |row: &[f32]| -> Vec<Lanes> { row.iter().map(|v| Lanes::splat(*v)).collect() };
+        let (action, output) = (splat(&corpus.executed[63..72]), splat(&samples.targets[7 * BASE_DIM..8 * BASE_DIM]));
+        dynamics.write_next(&splat(corpus.state(7)), &action, &output, &mut next);
         for (a, b) in next.iter().zip(&corpus.next[7 * BASE_DIM..]) {
-            assert!((a - b).abs() < 1e-6, "{a} against {b}");
+            assert!((a.0[0] - b).abs() < 1e-6, "{a:?} against {b}");
         }
     }
 }

@@ -1,9 +1,9 @@
 //! What a network sees of a state, and how a gradient comes back through it.
 
-use super::hand::{Chain, Hand, Vec3, add, cross, scale, sub, turn, turn_back};
+use super::hand::{Chain, Hand, Vec3, add, cross, sub, turn, turn_back};
 use super::scaling::Scaling;
 use crate::config::FeatureSet;
-use crate::nn::activation::tanh;
+use crate::nn::{LANES, Lanes, Panels, kernel};
 use crate::state::{BASE_DIM, JOINTS};
 use crate::tasks::{REST_HEIGHT_M, Task};
 
@@ -43,11 +43,7 @@ impl Features {
         let mut features = Self::from_scaling(task, set, mask_dq, state, plain);
         if width > 0 {
             let mut rows = Vec::with_capacity(states.len() / task.state_dim() * width);
-            let mut row = vec![0.0; features.width()];
-            for state in states.chunks_exact(task.state_dim()) {
-                features.forward(state, &features.hand(state), &mut row);
-                rows.extend_from_slice(&row[features.kept.len()..features.kept.len() + width]);
-            }
+            features.for_each(states, |inputs| rows.extend_from_slice(&inputs[features.kept.len()..][..width]));
             features.derived = Scaling::fit(&rows, width, STATE_FLOOR);
         }
         features
@@ -88,17 +84,33 @@ impl Features {
         self.set != FeatureSet::Raw
     }
 
-    /// Where the hand is in this state; all zeros when these features do not need it.
-    pub fn hand(&self, state: &[f32]) -> Hand {
+    /// The inputs of each of `states` (row-major), one after another.
+    pub fn for_each(&self, states: &[f32], mut take: impl FnMut(&[f32])) {
+        let (mut state, mut inputs, mut row) = (Panels::default(), Panels::default(), vec![0.0; self.width()]);
+        state.reserve(self.task.state_dim(), 1);
+        inputs.reserve(self.width(), 1);
+        for block in states.chunks(LANES * self.task.state_dim()) {
+            let rows = block.chunks_exact(self.task.state_dim());
+            rows.clone().enumerate().for_each(|(r, values)| state.write_row(r, values));
+            self.forward(state.panel(0), &self.hand(state.panel(0)), inputs.panel_mut(0));
+            for r in 0..rows.len() {
+                inputs.read_row(r, &mut row);
+                take(&row);
+            }
+        }
+    }
+
+    /// Where the hand is in these states; all zeros when these features do not need it.
+    pub fn hand(&self, state: &[Lanes]) -> Hand {
         if self.needs_hand() { self.chain.hand(state) } else { Hand::default() }
     }
 
-    fn relations(&self, state: &[f32], hand: &Hand) -> Relations {
+    fn relations(&self, state: &[Lanes], hand: &Hand) -> Relations {
         let block = vec3(state, BLOCK);
         let goal = match self.task {
             Task::PickUp => None,
             Task::PickAndPlace => Some(vec3(state, BASE_DIM)),
-            Task::Stack => Some(add(vec3(state, BASE_DIM), [0.0, 0.0, 2.0 * REST_HEIGHT_M as f32])),
+            Task::Stack => Some(add(vec3(state, BASE_DIM), [0.0, 0.0, 2.0 * REST_HEIGHT_M as f32].map(Lanes::splat))),
         };
         Relations {
             block_in_hand: turn_back(&hand.columns, sub(block, hand.tool)),
@@ -106,11 +118,11 @@ impl Features {
         }
     }
 
-    /// Writes the inputs of one state into `out` (`width()` numbers).
-    pub fn forward(&self, state: &[f32], hand: &Hand, out: &mut [f32]) {
+    /// Writes the inputs of a panel of states into `out` (`width()` entries).
+    pub fn forward(&self, state: &[Lanes], hand: &Hand, out: &mut [Lanes]) {
         let (kept, rest) = out.split_at_mut(self.kept.len());
         for (slot, i) in kept.iter_mut().zip(&self.kept) {
-            *slot = self.state.apply(*i, state[*i]);
+            *slot = state[*i].map(|v| self.state.apply(*i, v));
         }
         if !self.needs_hand() {
             return;
@@ -120,17 +132,18 @@ impl Features {
         let parts = [hand.tool, hand.columns[0], hand.columns[1], relations.block_in_hand];
         let values = parts.iter().chain(&relations.goal_minus_block).flatten();
         for (i, (slot, value)) in derived.iter_mut().zip(values).enumerate() {
-            *slot = self.derived.apply(i, *value);
+            *slot = value.map(|v| self.derived.apply(i, v));
         }
         let close = [relations.block_in_hand].into_iter().chain(relations.goal_minus_block).flatten();
-        near.iter_mut().zip(close).for_each(|(slot, value)| *slot = tanh(value / NEAR_M));
+        near.iter_mut().zip(close).for_each(|(slot, value)| *slot = value / NEAR_M);
+        kernel::tanh(near);
     }
 
     /// Adds to `d_state` the gradient that `d_inputs` sends back to the entries of the state that change during an episode;
     /// `inputs` is what [`Features::forward`] wrote.
-    pub fn backward(&self, state: &[f32], hand: &Hand, inputs: &[f32], d_inputs: &[f32], d_state: &mut [f32]) {
+    pub fn backward(&self, state: &[Lanes], hand: &Hand, inputs: &[Lanes], d_inputs: &[Lanes], d_state: &mut [Lanes]) {
         for (i, d) in self.kept.iter().zip(d_inputs).take_while(|(i, _)| **i < BASE_DIM) {
-            d_state[*i] += d / self.state.std[*i];
+            d_state[*i] += *d / self.state.std[*i];
         }
         if !self.needs_hand() {
             return;
@@ -141,9 +154,10 @@ impl Features {
         let near = |at: usize| -> Vec3 {
             let entry = near_from + at;
             if self.near_width() == 0 {
-                return [0.0; 3];
+                return Vec3::default();
             }
-            std::array::from_fn(|k| d_inputs[entry + k] * (1.0 - inputs[entry + k] * inputs[entry + k]) / NEAR_M)
+            let slope = |y: Lanes| Lanes::splat(1.0) - y * y;
+            std::array::from_fn(|k| d_inputs[entry + k] * slope(inputs[entry + k]) / NEAR_M)
         };
         // block in hand = R^T (block - tool); its gradient in the world's frame pulls at the block and pushes at the hand
         let pull = turn(&hand.columns, add(derived(9), near(0)));
@@ -153,7 +167,7 @@ impl Features {
         hand.add_joint_gradient(force, sub(turns, cross(arm, pull)), d_state);
         let mut d_block = pull;
         if self.task != Task::PickUp {
-            d_block = add(d_block, scale(add(derived(HAND_WIDTH), near(3)), -1.0));
+            d_block = sub(d_block, add(derived(HAND_WIDTH), near(3)));
         }
         d_state[BLOCK..].iter_mut().zip(d_block).for_each(|(slot, d)| *slot += d);
     }
@@ -167,7 +181,7 @@ pub fn derived_width(task: Task, set: FeatureSet) -> usize {
     }
 }
 
-fn vec3(row: &[f32], at: usize) -> Vec3 {
+fn vec3(row: &[Lanes], at: usize) -> Vec3 {
     [row[at], row[at + 1], row[at + 2]]
 }
 
@@ -186,26 +200,26 @@ mod tests {
         ] {
             let states = random_states(task, 20, 7);
             let features = Features::fit(task, set, mask_dq, &states);
-            let state = &states[..task.state_dim()];
-            let weights: Vec<f32> = (0..features.width()).map(|i| ((i * 29 % 13) as f32 - 6.0) / 6.0).collect();
-            let loss = |state: &[f32]| -> f64 {
-                let mut out = vec![0.0; features.width()];
+            let state: Vec<Lanes> = states[..task.state_dim()].iter().map(|v| Lanes::splat(*v)).collect();
+            let weights: Vec<Lanes> = (0..features.width()).map(|i| Lanes::splat(((i * 29 % 13) as f32 - 6.0) / 6.0)).collect();
+            let loss = |state: &[Lanes]| -> f64 {
+                let mut out = vec![Lanes::default(); features.width()];
                 features.forward(state, &features.hand(state), &mut out);
-                out.iter().zip(&weights).map(|(o, w)| f64::from(o * w)).sum()
+                out.iter().zip(&weights).map(|(o, w)| f64::from((*o * *w).0[3])).sum()
             };
-            let mut inputs = vec![0.0; features.width()];
-            features.forward(state, &features.hand(state), &mut inputs);
-            let mut gradient = vec![0.0; BASE_DIM];
-            features.backward(state, &features.hand(state), &inputs, &weights, &mut gradient);
-            for (i, analytic) in gradient.iter().enumerate() {
+            let mut inputs = vec![Lanes::default(); features.width()];
+            features.forward(&state, &features.hand(&state), &mut inputs);
+            let mut gradient = vec![Lanes::default(); BASE_DIM];
+            features.backward(&state, &features.hand(&state), &inputs, &weights, &mut gradient);
+            for (i, analytic) in gradient.iter().map(|d| d.0[3]).enumerate() {
                 let h = 1e-3;
                 let at = |sign: f32| {
-                    let mut moved = state.to_vec();
-                    moved[i] += sign * h;
+                    let mut moved = state.clone();
+                    moved[i] += Lanes::splat(sign * h);
                     loss(&moved)
                 };
                 let numeric = (at(1.0) - at(-1.0)) / f64::from(2.0 * h);
-                let error = (numeric - f64::from(*analytic)).abs();
+                let error = (numeric - f64::from(analytic)).abs();
                 assert!(error < 0.02 * (1.0 + numeric.abs()), "{task} {set:?} entry {i}: {analytic} against {numeric}");
             }
         }

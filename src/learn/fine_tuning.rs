@@ -35,7 +35,7 @@ impl Model {
         let loss = model_loss(dynamics, rows.len(), mean_length);
         let l_model = work.loss(&dynamics.net, samples, rows, &loss, true);
         clip_by_global_norm(&mut work.gradient, dynamics.settings().clip_norm);
-        adam.step(dynamics.net.params_mut(), &work.gradient, learning_rate);
+        adam.step(&mut dynamics.net.params_mut(), &work.gradient, learning_rate);
         l_model
     }
 

@@ -8,7 +8,7 @@ use super::shards::add_scaled;
 use super::state_cloning::{self as sc, Segment, draw_segments, state_cloning};
 use super::testing::demos;
 use crate::config::{ActionChoice, FeatureSet, Objective, Pairs, PretrainSettings, StateScale, Structure, TrainSettings};
-use crate::nn::{Activation, Pass};
+use crate::nn::{Activation, LANES, Lanes, Pass};
 use crate::seed::stream;
 use crate::state::{BASE_DIM, JOINTS};
 use crate::tasks::Task;
@@ -107,7 +107,7 @@ fn check(world: &mut World, gradient: &[f32], d_log_std: &[f32], mut loss: impl 
         let kept = world.policy.net.params().to_vec();
         let mut at = |h: f32| {
             world.policy.net.params_mut().copy_from_slice(&kept);
-            add_scaled(world.policy.net.params_mut(), &direction, h);
+            add_scaled(&mut world.policy.net.params_mut(), &direction, h);
             loss(world)
         };
         let h = 4e-3;
@@ -191,79 +191,84 @@ fn state_cloning_gradient_equals_finite_differences() {
     }
 }
 
-/// Algorithm 3 as printed, one demo and one step at a time, with back-propagation through time along the demo.
+/// Algorithm 3 as printed, one demo and one step at a time, with back-propagation through time along the demo. A step has a panel for
+/// itself: its states stand in all lanes, its gradient in the first alone.
 fn step_by_step(world: &World, gradient: &mut [f32]) -> f64 {
     let World { corpus, policy, dynamics, settings, .. } = world;
     let choices = sc::Choices::new(settings, corpus);
     let scale = choices.scale(world.rows.len(), 8);
     let noise = noise(settings, world.rows.len());
+    let first_lane = |v: f32| Lanes(std::array::from_fn(|l| if l == 0 { v } else { 0.0 }));
+    let splat = |row: &[f32]| -> Vec<Lanes> { row.iter().map(|v| Lanes::splat(*v)).collect() };
     let (mut coins, mut l_sc, mut at) = (stream(5, "coins", 0), 0.0f64, 0);
     for demo in [6, 1, 3, 0, 5, 2, 4, 7] {
         let rows = corpus.demo(demo);
         let steps = rows.len();
         let (mut pi, mut f) = (Pass::new(&policy.net, steps), Pass::new(&dynamics.net, steps));
-        let (mut states, mut d_predictions, mut recovered) = (vec![corpus.state(rows.start).to_vec()], Vec::new(), Vec::new());
+        let (mut states, mut d_predictions, mut recovered) = (vec![splat(corpus.state(rows.start))], Vec::new(), Vec::new());
         for t in 0..steps {
-            let (s, width, model_width) = (states[t].clone(), policy.net.inputs(), dynamics.inputs());
-            policy.features().forward(&s, &policy.features().hand(&s), &mut pi.input[t * width..(t + 1) * width]);
+            let s = states[t].clone();
+            policy.features().forward(&s, &policy.features().hand(&s), pi.input.panel_mut(t));
             policy.net.forward(&mut pi, t..t + 1);
-            let action: Vec<f32> = (0..JOINTS)
+            let action: Vec<Lanes> = (0..JOINTS)
                 .map(|k| {
                     let eps = noise.get((at + t) * JOINTS + k).copied().unwrap_or(0.0);
-                    policy.action_scaling().undo(k, pi.output[t * JOINTS + k] + policy.log_std[k].exp() * eps)
+                    let mean = pi.output.get(t * LANES, k) + policy.log_std[k].exp() * eps;
+                    Lanes::splat(policy.action_scaling().undo(k, mean))
                 })
                 .collect();
-            dynamics.write_inputs(&s, &action, &mut f.input[t * model_width..(t + 1) * model_width]);
+            dynamics.write_inputs(&s, &action, f.input.panel_mut(t));
             dynamics.net.forward(&mut f, t..t + 1);
             let mut prediction = s.clone();
-            dynamics.write_next(&s, &action, row(&f.output, BASE_DIM, t), &mut prediction[..BASE_DIM]);
+            dynamics.write_next(&s, &action, f.output.panel(t), &mut prediction[..BASE_DIM]);
             let target = row(&corpus.next, BASE_DIM, rows.start + t);
             let coin = coins.random::<f64>() < settings.rho;
             let counts = !(coin && settings.sc_pairs == Pairs::AfterRecovery);
-            let mut d_prediction = [0.0f32; BASE_DIM];
+            let mut d_prediction = [Lanes::default(); BASE_DIM];
             for k in (0..BASE_DIM).filter(|_| counts) {
-                let error = prediction[k] - target[k];
+                let error = prediction[k].0[0] - target[k];
                 l_sc += f64::from(scale * choices.weights[k] * error * error);
-                d_prediction[k] = 2.0 * scale * choices.weights[k] * error;
+                d_prediction[k] = first_lane(2.0 * scale * choices.weights[k] * error);
             }
             if coin {
-                prediction[..BASE_DIM].copy_from_slice(target);
+                prediction[..BASE_DIM].copy_from_slice(&splat(target));
             }
             d_predictions.push(d_prediction);
             recovered.push(coin);
             states.push(prediction);
         }
-        let mut carry = [0.0f32; BASE_DIM];
+        let mut carry = [Lanes::default(); BASE_DIM];
         for t in (0..steps).rev() {
             let mut d_next = d_predictions[t];
             if !recovered[t] {
-                add_scaled(&mut d_next, &carry, 1.0);
+                d_next.iter_mut().zip(carry).for_each(|(d, carry)| *d += carry);
             }
             let known = dynamics.settings().structure == Structure::Kinematic;
             let residual = &dynamics.residual_scaling().std;
-            (0..BASE_DIM).for_each(|k| f.d_output[t * BASE_DIM + k] = d_next[k] * residual[k]);
+            (0..BASE_DIM).for_each(|k| f.d_output.panel_mut(t)[k] = d_next[k] * residual[k]);
             dynamics.net.backward(&mut f, t..t + 1);
             dynamics.net.backward_input(&mut f, t..t + 1);
-            let d_input = row(&f.d_input, dynamics.inputs(), t).to_vec();
             let seen = dynamics.features().width();
             for k in 0..JOINTS {
-                let base = if known { 0.05 * d_next[k] + d_next[JOINTS + k] } else { 0.0 };
-                let d_action = d_input[seen + k] / dynamics.action_scaling().std[k] + base;
-                pi.d_output[t * JOINTS + k] = d_action * policy.action_scaling().std[k];
+                let base = if known { d_next[k] * 0.05 + d_next[JOINTS + k] } else { Lanes::default() };
+                let d_action = f.d_input.panel(t)[seen + k] / dynamics.action_scaling().std[k] + base;
+                pi.d_output.panel_mut(t)[k] = d_action * policy.action_scaling().std[k];
             }
             policy.net.backward(&mut pi, t..t + 1);
             policy.net.backward_input(&mut pi, t..t + 1);
             carry = d_next;
             if known {
-                carry[JOINTS..2 * JOINTS].fill(0.0);
+                carry[JOINTS..2 * JOINTS].fill(Lanes::default());
             }
             let s = &states[t];
-            let (input, d_pi) = (row(&pi.input, policy.net.inputs(), t), row(&pi.d_input, policy.net.inputs(), t));
-            policy.features().backward(s, &policy.features().hand(s), input, d_pi, &mut carry);
-            let input = row(&f.input, dynamics.inputs(), t);
-            dynamics.features().backward(s, &dynamics.features().hand(s), input, &d_input, &mut carry);
+            let (features, hand) = (policy.features(), policy.features().hand(s));
+            features.backward(s, &hand, pi.input.panel(t), pi.d_input.panel(t), &mut carry);
+            let (features, hand) = (dynamics.features(), dynamics.features().hand(s));
+            features.backward(s, &hand, f.input.panel(t), f.d_input.panel(t), &mut carry);
         }
-        policy.net.add_gradient(&pi, 0..steps, gradient);
+        policy.net.begin_gradient(&mut pi);
+        policy.net.add_gradient(&mut pi, 0..steps);
+        policy.net.finish_gradient(&pi, gradient);
         at += steps;
     }
     l_sc

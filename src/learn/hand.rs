@@ -1,12 +1,14 @@
-//! The hand's pose from the arm's joint angles in f32, with what its derivative needs: per joint, axis and origin in the world.
+//! The hand's pose from the arm's joint angles in f32, with what its derivative needs: per joint, axis and origin in the world. Eight
+//! states at a time.
 
+use crate::nn::Lanes;
 use crate::robot::jaco::TOOL_IN_HAND_M;
 use crate::robot::kinematics::Arm;
 use crate::state::ARM_JOINTS;
 use std::f32::consts::FRAC_2_PI;
 
-/// A vector.
-pub type Vec3 = [f32; 3];
+/// Eight vectors.
+pub type Vec3 = [Lanes; 3];
 
 /// Where hand and joints are at some joint angles.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -24,8 +26,8 @@ pub struct Hand {
 /// The fixed transforms of the arm, in f32.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Chain {
-    rotations: [[Vec3; 3]; ARM_JOINTS],
-    offsets: [Vec3; ARM_JOINTS],
+    rotations: [[[f32; 3]; 3]; ARM_JOINTS],
+    offsets: [[f32; 3]; ARM_JOINTS],
 }
 
 impl Default for Chain {
@@ -44,18 +46,19 @@ impl Default for Chain {
 
 impl Chain {
     /// The hand at joint angles `q` (the arm's six are read) \[rad\].
-    pub fn hand(&self, q: &[f32]) -> Hand {
-        let mut hand = Hand { columns: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]], ..Hand::default() };
-        let mut position = [0.0; 3];
+    pub fn hand(&self, q: &[Lanes]) -> Hand {
+        let mut hand = Hand::default();
+        (0..3).for_each(|i| hand.columns[i][i] = Lanes::splat(1.0));
+        let mut position = Vec3::default();
         for (i, angle) in q[..ARM_JOINTS].iter().enumerate() {
-            position = add(position, turn(&hand.columns, self.offsets[i]));
-            let [x, y, z] = self.rotations[i].map(|column| turn(&hand.columns, column));
+            position = add(position, turn(&hand.columns, self.offsets[i].map(Lanes::splat)));
+            let [x, y, z] = self.rotations[i].map(|column| turn(&hand.columns, column.map(Lanes::splat)));
             let (sin, cos) = sin_cos(*angle);
-            hand.columns = [add(scale(x, cos), scale(y, sin)), add(scale(y, cos), scale(x, -sin)), z];
+            hand.columns = [add(scale(x, cos), scale(y, sin)), sub(scale(y, cos), scale(x, sin)), z];
             hand.axes[i] = z;
             hand.origins[i] = position;
         }
-        hand.tool = add(position, turn(&hand.columns, TOOL_IN_HAND_M.map(|v| v as f32)));
+        hand.tool = add(position, turn(&hand.columns, TOOL_IN_HAND_M.map(|v| Lanes::splat(v as f32))));
         hand
     }
 }
@@ -63,7 +66,7 @@ impl Chain {
 impl Hand {
     /// Adds to `d_q` the gradient that reaches the joints when a force `f` pulls at the tool point and a moment `m` turns the hand:
     /// joint i gets z_i . ((p - o_i) x f + m).
-    pub fn add_joint_gradient(&self, f: Vec3, m: Vec3, d_q: &mut [f32]) {
+    pub fn add_joint_gradient(&self, f: Vec3, m: Vec3, d_q: &mut [Lanes]) {
         for (i, d) in d_q[..ARM_JOINTS].iter_mut().enumerate() {
             let lever = sub(self.tool, self.origins[i]);
             *d += dot(self.axes[i], add(cross(lever, f), m));
@@ -74,54 +77,69 @@ impl Hand {
 /// pi / 2 in two parts: the first has few digits, so that its product with a number of quarter turns is exact.
 const HALF_PI_HIGH: f32 = 1.570_312_5;
 const HALF_PI_LOW: f32 = 4.838_268e-4;
+/// 1.5 x 2^23: adding it rounds a small f32 to an integer, which then stands in the low bits.
+const ROUND: f32 = 12_582_912.0;
 
 /// Sine and cosine to about 2e-7 for |x| up to a few dozen turns; the same bytes on every platform, unlike the system's.
-pub fn sin_cos(x: f32) -> (f32, f32) {
-    let turns = (x * FRAC_2_PI).round_ties_even();
+#[inline(always)]
+pub fn sin_cos(x: Lanes) -> (Lanes, Lanes) {
+    let rounded = x.map(|x| x * FRAC_2_PI + ROUND);
+    let turns = rounded.map(|r| r - ROUND);
     let f = (x - turns * HALF_PI_HIGH) - turns * HALF_PI_LOW;
     let f2 = f * f;
     // Taylor series on |f| <= pi / 4; the first terms left out are worth 2e-9 and 2e-8.
-    let sin = f * (1.0 + f2 * (-1.0 / 6.0 + f2 * (1.0 / 120.0 + f2 * (-1.0 / 5040.0 + f2 / 362_880.0))));
-    let cos = 1.0 + f2 * (-0.5 + f2 * (1.0 / 24.0 + f2 * (-1.0 / 720.0 + f2 / 40_320.0)));
-    match (turns as i64).rem_euclid(4) {
-        0 => (sin, cos),
-        1 => (cos, -sin),
-        2 => (-sin, -cos),
-        _ => (-cos, sin),
-    }
+    let sin = f * f2.map(|f2| 1.0 + f2 * (-1.0 / 6.0 + f2 * (1.0 / 120.0 + f2 * (-1.0 / 5040.0 + f2 / 362_880.0))));
+    let cos = f2.map(|f2| 1.0 + f2 * (-0.5 + f2 * (1.0 / 24.0 + f2 * (-1.0 / 720.0 + f2 / 40_320.0))));
+    // a quarter turn makes (sin, cos) of (cos, -sin)
+    let quarter = |i: usize| rounded.0[i].to_bits();
+    let pick = |i: usize, even: f32, odd: f32, minus: u32| {
+        let value = if quarter(i) & 1 == 0 { even } else { odd };
+        f32::from_bits(value.to_bits() ^ (minus & 2) << 30)
+    };
+    (
+        Lanes(std::array::from_fn(|i| pick(i, sin.0[i], cos.0[i], quarter(i)))),
+        Lanes(std::array::from_fn(|i| pick(i, cos.0[i], sin.0[i], quarter(i).wrapping_add(1)))),
+    )
 }
 
 /// a + b.
+#[inline(always)]
 pub fn add(a: Vec3, b: Vec3) -> Vec3 {
     [a[0] + b[0], a[1] + b[1], a[2] + b[2]]
 }
 
 /// a - b.
+#[inline(always)]
 pub fn sub(a: Vec3, b: Vec3) -> Vec3 {
     [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
 }
 
 /// a times s.
-pub fn scale(a: Vec3, s: f32) -> Vec3 {
+#[inline(always)]
+pub fn scale(a: Vec3, s: Lanes) -> Vec3 {
     [a[0] * s, a[1] * s, a[2] * s]
 }
 
 /// a . b.
-pub fn dot(a: Vec3, b: Vec3) -> f32 {
+#[inline(always)]
+pub fn dot(a: Vec3, b: Vec3) -> Lanes {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
 /// a x b.
+#[inline(always)]
 pub fn cross(a: Vec3, b: Vec3) -> Vec3 {
     [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }
 
 /// R v, R given by its columns.
+#[inline(always)]
 pub fn turn(columns: &[Vec3; 3], v: Vec3) -> Vec3 {
     add(add(scale(columns[0], v[0]), scale(columns[1], v[1])), scale(columns[2], v[2]))
 }
 
 /// R^T v.
+#[inline(always)]
 pub fn turn_back(columns: &[Vec3; 3], v: Vec3) -> Vec3 {
     [dot(columns[0], v), dot(columns[1], v), dot(columns[2], v)]
 }
@@ -129,34 +147,38 @@ pub fn turn_back(columns: &[Vec3; 3], v: Vec3) -> Vec3 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::nn::LANES;
     use crate::robot::jaco::READY_Q_RAD;
 
     #[test]
     fn sine_and_cosine_are_close() {
-        for i in -40_000..40_000 {
-            let x = i as f32 * 1e-3;
+        for i in -5_000..5_000 {
+            let x = Lanes(std::array::from_fn(|l| (i * LANES as i32 + l as i32) as f32 * 1e-3));
             let (sin, cos) = sin_cos(x);
-            assert!((f64::from(sin) - f64::from(x).sin()).abs() < 3e-7, "sin {x}");
-            assert!((f64::from(cos) - f64::from(x).cos()).abs() < 3e-7, "cos {x}");
+            for (x, (sin, cos)) in x.0.iter().zip(sin.0.iter().zip(cos.0)) {
+                assert!((f64::from(*sin) - f64::from(*x).sin()).abs() < 3e-7, "sin {x}");
+                assert!((f64::from(cos) - f64::from(*x).cos()).abs() < 3e-7, "cos {x}");
+            }
         }
     }
 
     #[test]
     fn the_hand_is_where_the_arms_own_kinematics_have_it() {
+        // lane 5 holds the angles in question, the others something else
         let q = READY_Q_RAD.map(|v| v + 0.3);
-        let hand = Chain::default().hand(&q.map(|v| v as f32));
+        let hand = Chain::default().hand(&q.map(|v| Lanes(std::array::from_fn(|l| v as f32 + 0.1 * (l as f32 - 5.0)))));
         let (tool, jacobian) = Arm::new().tool_jacobian(&q);
         let matrix = tool.rotation.to_rotation_matrix();
         for r in 0..3 {
-            assert!((f64::from(hand.tool[r]) - tool.translation.vector[r]).abs() < 1e-6);
-            (0..3).for_each(|c| assert!((f64::from(hand.columns[c][r]) - matrix[(r, c)]).abs() < 1e-6));
-            let (mut along, mut about) = ([0.0; ARM_JOINTS], [0.0; ARM_JOINTS]);
-            let unit = std::array::from_fn(|k| if k == r { 1.0 } else { 0.0 });
-            hand.add_joint_gradient(unit, [0.0; 3], &mut along);
-            hand.add_joint_gradient([0.0; 3], unit, &mut about);
+            assert!((f64::from(hand.tool[r].0[5]) - tool.translation.vector[r]).abs() < 1e-6);
+            (0..3).for_each(|c| assert!((f64::from(hand.columns[c][r].0[5]) - matrix[(r, c)]).abs() < 1e-6));
+            let (mut along, mut about) = ([Lanes::default(); ARM_JOINTS], [Lanes::default(); ARM_JOINTS]);
+            let unit = std::array::from_fn(|k| Lanes::splat(if k == r { 1.0 } else { 0.0 }));
+            hand.add_joint_gradient(unit, Vec3::default(), &mut along);
+            hand.add_joint_gradient(Vec3::default(), unit, &mut about);
             for i in 0..ARM_JOINTS {
-                assert!((f64::from(along[i]) - jacobian[(r, i)]).abs() < 1e-5);
-                assert!((f64::from(about[i]) - jacobian[(r + 3, i)]).abs() < 1e-5);
+                assert!((f64::from(along[i].0[5]) - jacobian[(r, i)]).abs() < 1e-5);
+                assert!((f64::from(about[i].0[5]) - jacobian[(r + 3, i)]).abs() < 1e-5);
             }
         }
     }

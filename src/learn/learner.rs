@@ -213,7 +213,7 @@ impl Learner {
             self.skipped += 1;
             return;
         }
-        self.net_descent.adam.step(self.policy.net.params_mut(), &self.gradient, learning_rate);
+        self.net_descent.adam.step(&mut self.policy.net.params_mut(), &self.gradient, learning_rate);
         self.net_descent.ema.update(self.policy.net.params());
         self.std_descent.adam.step(&mut self.policy.log_std, &d_log_std, learning_rate);
         gaussian::floor_log_std(&mut self.policy.log_std, self.settings.std_floor.ln() as f32);

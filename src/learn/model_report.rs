@@ -2,7 +2,7 @@
 
 use super::corpus::{Corpus, row};
 use super::dynamics::{DT_S, Dynamics};
-use crate::nn::Pass;
+use crate::nn::{LANES, Panels, Pass};
 use crate::state::{ARM_JOINTS, BASE_DIM, JOINTS};
 use crate::table::{Table, Values};
 use std::ops::Range;
@@ -77,8 +77,7 @@ fn errors(dynamics: &Dynamics, corpus: &Corpus, model: Model, steps: usize) -> [
 
 /// One step of all `states`; row r is given the executed action of transition `first + r`.
 fn advance(dynamics: &Dynamics, corpus: &Corpus, model: Model, first: usize, states: &mut [f32], pass: &mut Pass) {
-    let (dim, width) = (corpus.task.state_dim(), dynamics.inputs());
-    let rows = states.len() / dim;
+    let dim = corpus.task.state_dim();
     let action = |r: usize| row(&corpus.executed, JOINTS, first + r);
     match model {
         Model::Unchanged => {}
@@ -91,15 +90,17 @@ fn advance(dynamics: &Dynamics, corpus: &Corpus, model: Model, first: usize, sta
             }
         }
         Model::Network => {
-            pass.reserve(&dynamics.net, rows);
-            for (r, state) in states.chunks_exact(dim).enumerate() {
-                dynamics.write_inputs(state, action(r), &mut pass.input[r * width..(r + 1) * width]);
-            }
-            dynamics.net.forward(pass, 0..rows);
-            let mut next = [0.0; BASE_DIM];
-            for (r, state) in states.chunks_exact_mut(dim).enumerate() {
-                dynamics.write_next(state, action(r), row(&pass.output, BASE_DIM, r), &mut next);
-                state[..BASE_DIM].copy_from_slice(&next);
+            pass.reserve(&dynamics.net, 1);
+            let (mut panel, mut actions) = (Panels::default(), Panels::default());
+            panel.reserve(dim, 1);
+            actions.reserve(JOINTS, 1);
+            for (p, block) in states.chunks_mut(LANES * dim).enumerate() {
+                for (r, state) in block.chunks_exact(dim).enumerate() {
+                    panel.write_row(r, state);
+                    actions.write_row(r, action(p * LANES + r));
+                }
+                dynamics.step(panel.panel_mut(0), actions.panel(0), pass);
+                block.chunks_exact_mut(dim).enumerate().for_each(|(r, state)| panel.read_row(r, state));
             }
         }
     }

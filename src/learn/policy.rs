@@ -5,7 +5,7 @@ use super::features::Features;
 use super::scaling::Scaling;
 use super::weights::{Reader, push_features, push_network, push_scaling, vector};
 use crate::config::TrainSettings;
-use crate::nn::{Mlp, Pass};
+use crate::nn::{Lanes, Mlp, Pass};
 use crate::state::JOINTS;
 use crate::tasks::Task;
 use crate::tensor::NamedTensor;
@@ -93,12 +93,13 @@ impl Policy {
         std::array::from_fn(|i| self.action.undo(i, mean[i] + self.log_std[i].exp() * noise[i]))
     }
 
-    fn mean(&self, state_row: &[f32]) -> Vec<f32> {
+    fn mean(&self, state_row: &[f32]) -> [f32; JOINTS] {
         assert_eq!(state_row.len(), self.task.state_dim(), "the row of another task than {}", self.task);
         let mut pass = Pass::new(&self.net, 1);
-        self.features.forward(state_row, &self.features.hand(state_row), &mut pass.input);
+        let state: Vec<Lanes> = state_row.iter().map(|v| Lanes::splat(*v)).collect();
+        self.features.forward(&state, &self.features.hand(&state), pass.input.panel_mut(0));
         self.net.forward(&mut pass, 0..1);
-        pass.output
+        std::array::from_fn(|i| pass.output.get(0, i))
     }
 
     /// All arrays.

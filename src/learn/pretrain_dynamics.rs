@@ -51,7 +51,7 @@ pub fn pretrain_dynamics(
             }
             clip_by_global_norm(&mut work.gradient, settings.clip_norm);
             metrics.learning_rate = cosine(settings.learning_rate, settings.final_learning_rate, updates, total);
-            adam.step(dynamics.net.params_mut(), &work.gradient, metrics.learning_rate);
+            adam.step(&mut dynamics.net.params_mut(), &work.gradient, metrics.learning_rate);
             ema.update(dynamics.net.params());
             mean.add(l_model);
             updates += 1;

@@ -2,7 +2,7 @@
 
 use super::corpus::{Samples, row};
 use super::shards;
-use crate::nn::{Mlp, Pass};
+use crate::nn::{BLOCK_PANELS, LANES, Lanes, Mlp, Pass, panels_of};
 use rayon::prelude::*;
 
 /// Where Huber's function turns from a parabola into a line, in standard deviations.
@@ -57,33 +57,61 @@ impl Regression {
 
 impl Shard {
     fn run(&mut self, net: &Mlp, samples: &Samples, rows: &[usize], loss: &Loss, learn: bool) {
-        let (inputs, outputs) = (net.inputs(), net.outputs());
-        self.pass.reserve(net, rows.len());
-        for (slot, r) in rows.iter().enumerate() {
-            self.pass.input[slot * inputs..(slot + 1) * inputs].copy_from_slice(row(&samples.inputs, inputs, *r));
-        }
-        net.forward(&mut self.pass, 0..rows.len());
+        self.pass.reserve(net, BLOCK_PANELS);
         self.loss = 0.0;
-        for (slot, r) in rows.iter().enumerate() {
-            let mut sum = 0.0f32;
-            for (i, target) in row(&samples.targets, outputs, *r).iter().enumerate() {
-                let error = self.pass.output[slot * outputs + i] - target;
-                let (value, slope) = if loss.huber && error.abs() > HUBER_KNEE {
-                    (HUBER_KNEE * (2.0 * error.abs() - HUBER_KNEE), 2.0 * HUBER_KNEE * error.signum())
-                } else {
-                    (error * error, 2.0 * error)
-                };
-                sum += loss.weights[i] * value;
-                self.pass.d_output[slot * outputs + i] = loss.scale * loss.weights[i] * slope;
-            }
-            self.loss += f64::from(loss.scale * sum);
+        net.begin_gradient(&mut self.pass);
+        for rows in rows.chunks(BLOCK_PANELS * LANES) {
+            self.block(net, samples, rows, loss, learn);
         }
         if learn {
-            net.backward(&mut self.pass, 0..rows.len());
             self.gradient.clear();
             self.gradient.resize(net.params().len(), 0.0);
-            net.add_gradient(&self.pass, 0..rows.len(), &mut self.gradient);
+            net.finish_gradient(&self.pass, &mut self.gradient);
         }
+    }
+
+    fn block(&mut self, net: &Mlp, samples: &Samples, rows: &[usize], loss: &Loss, learn: bool) {
+        let panels = panels_of(rows.len());
+        for (slot, r) in rows.iter().enumerate() {
+            self.pass.input.write_row(slot, row(&samples.inputs, net.inputs(), *r));
+        }
+        self.pass.input.clear_tail(rows.len());
+        net.forward(&mut self.pass, 0..panels);
+        for (p, rows) in rows.chunks(LANES).enumerate() {
+            self.panel_loss(samples, p, rows, loss);
+        }
+        if learn {
+            net.backward(&mut self.pass, 0..panels);
+            net.add_gradient(&mut self.pass, 0..panels);
+        }
+    }
+
+    /// Loss of one panel, and its gradient; lanes without a row have no error.
+    fn panel_loss(&mut self, samples: &Samples, p: usize, rows: &[usize], loss: &Loss) {
+        let (output, d_output) = (self.pass.output.panel(p), self.pass.d_output.panel_mut(p));
+        d_output.copy_from_slice(output);
+        for (lane, r) in rows.iter().enumerate() {
+            let target = row(&samples.targets, output.len(), *r);
+            d_output.iter_mut().zip(target).for_each(|(slot, value)| slot.0[lane] = *value);
+        }
+        let mut sum = Lanes::default();
+        for ((d, output), weight) in d_output.iter_mut().zip(output).zip(&loss.weights) {
+            let error = *output - *d;
+            // Huber's function is a parabola up to the knee, and a line from there
+            let knee = if loss.huber { HUBER_KNEE } else { f32::INFINITY };
+            let bent = error.map(|e| {
+                if e > knee {
+                    knee
+                } else if e < -knee {
+                    -knee
+                } else {
+                    e
+                }
+            });
+            sum += bent * (error * 2.0 - bent) * *weight;
+            *d = bent * (2.0 * loss.scale * weight);
+        }
+        self.loss += sum.0.iter().map(|sum| f64::from(loss.scale * sum)).sum::<f64>();
     }
 }
 

@@ -1,7 +1,8 @@
 //! Segments of Algorithm 3 advancing together, and the gradient back through time: policy, features and dynamics network.
 //!
-//! Segments are sorted by length, longest first, so that at depth j the first `counts[j]` of them are still under way. The rows of all
-//! depths lie one after another; depth 0 has no row in the policy's pass, because behavior cloning has done that pass.
+//! Segments are sorted by length, longest first, so that at depth j the first `counts[j]` of them are still under way. The panels of all
+//! depths lie one after another, each depth beginning a new one; depth 0 has none in the policy's pass, because behavior cloning has
+//! done that pass. Lanes without a segment hold zeros, and no gradient enters them.
 
 use super::corpus::row;
 use super::dynamics::{DT_S, Dynamics};
@@ -9,8 +10,9 @@ use super::hand::Hand;
 use super::policy::Policy;
 use super::state_cloning::{Batch, Choices, Segment};
 use crate::config::{ActionChoice, Structure};
-use crate::nn::Pass;
+use crate::nn::{LANES, Lanes, Panels, Pass, panels_of};
 use crate::state::{BASE_DIM, JOINTS};
+use std::ops::Range;
 
 /// The workspace of one shard.
 #[derive(Default)]
@@ -20,17 +22,20 @@ pub struct Rollout {
     counts: Vec<usize>,
     policy: Pass,
     model: Pass,
-    /// States at depth 1 and beyond, one after another.
-    states: Vec<f32>,
+    /// States at all depths.
+    states: Panels,
+    /// One a panel of `states`; those of depth 0 are not used.
     hands: Vec<Hand>,
-    /// Actions at the current depth, one row a segment \[rad/s\].
-    actions: Vec<f32>,
+    /// Actions at the current depth \[rad/s\].
+    actions: Panels,
+    /// Standard normal numbers at the current depth, where actions are sampled.
+    noise: Panels,
     /// Predictions at all depths.
-    predictions: Vec<f32>,
-    /// Gradient with respect to the states at the current depth, one row a segment.
-    d_states: Vec<f32>,
+    predictions: Panels,
+    /// Gradient with respect to the states at the current depth.
+    d_states: Panels,
     /// Gradient with respect to each segment's first mean action.
-    d_first: Vec<f32>,
+    d_first: Panels,
     /// Gradient with respect to the policy's parameters, first actions left out.
     pub gradient: Vec<f32>,
     /// Gradient with respect to the log standard deviations.
@@ -39,16 +44,29 @@ pub struct Rollout {
     pub loss: f64,
 }
 
-/// Where the rows of one depth lie.
+/// Where one depth lies.
 #[derive(Clone, Copy)]
 struct Depth {
     j: usize,
-    /// First row in the dynamics network's pass.
+    /// First panel of states, predictions and the dynamics network's pass.
     from: usize,
-    /// First row in the policy's pass, for j > 0.
+    /// First panel in the policy's pass, for j > 0.
     later: usize,
+    panels: usize,
     count: usize,
     next_count: usize,
+}
+
+impl Depth {
+    /// Panel `p` of this depth: its place in the dynamics network's pass and, for j > 0, in the policy's.
+    fn places(self) -> impl Iterator<Item = (usize, usize, usize)> {
+        (0..self.panels).map(move |p| (p, self.from + p, self.later + p))
+    }
+
+    /// Segments of panel `p`.
+    fn segments(self, p: usize) -> Range<usize> {
+        p * LANES..self.count.min((p + 1) * LANES)
+    }
 }
 
 impl Rollout {
@@ -64,179 +82,186 @@ impl Rollout {
     }
 
     fn depth(&self, j: usize) -> Depth {
-        let from = self.counts[..j].iter().sum();
+        let from = self.counts[..j].iter().map(|c| panels_of(*c)).sum();
+        let later = if j > 0 { from - panels_of(self.counts[0]) } else { 0 };
         let next_count = self.counts.get(j + 1).copied().unwrap_or(0);
-        Depth { j, from, later: from - if j > 0 { self.counts[0] } else { 0 }, count: self.counts[j], next_count }
+        Depth { j, from, later, panels: panels_of(self.counts[j]), count: self.counts[j], next_count }
     }
 
     /// Loss and gradient of the segments.
     pub fn run(&mut self, policy: &Policy, dynamics: &Dynamics, batch: Batch, choices: &Choices) {
-        let (rows, first) = (self.counts.iter().sum::<usize>(), self.segments.len());
-        let dim = batch.corpus.task.state_dim();
-        self.policy.reserve(&policy.net, rows - first);
-        self.model.reserve(&dynamics.net, rows);
-        self.states.resize((rows - first) * dim, 0.0);
-        self.hands.resize(rows - first, Hand::default());
-        self.predictions.resize(rows * BASE_DIM, 0.0);
-        self.actions.resize(first * JOINTS, 0.0);
-        self.d_first.resize(first * JOINTS, 0.0);
-        self.d_states.clear();
-        self.d_states.resize(first * BASE_DIM, 0.0);
-        self.gradient.clear();
-        self.gradient.resize(policy.net.params().len(), 0.0);
-        self.d_log_std = [0.0; JOINTS];
-        self.loss = 0.0;
+        self.prepare(policy, dynamics, batch);
         for j in 0..self.counts.len() {
             self.advance(self.depth(j), policy, dynamics, batch, choices);
         }
         for j in (0..self.counts.len()).rev() {
             self.retrace(self.depth(j), policy, dynamics, batch, choices);
         }
-        policy.net.add_gradient(&self.policy, 0..rows - first, &mut self.gradient);
+        let later = self.hands.len() - panels_of(self.segments.len());
+        policy.net.begin_gradient(&mut self.policy);
+        policy.net.add_gradient(&mut self.policy, 0..later);
+        policy.net.finish_gradient(&self.policy, &mut self.gradient);
+    }
+
+    fn prepare(&mut self, policy: &Policy, dynamics: &Dynamics, batch: Batch) {
+        let panels: usize = self.counts.iter().map(|c| panels_of(*c)).sum();
+        let (dim, first) = (batch.corpus.task.state_dim(), panels_of(self.segments.len()));
+        self.policy.reserve(&policy.net, panels - first);
+        self.model.reserve(&dynamics.net, panels);
+        self.states.reserve(dim, panels);
+        self.hands.resize(panels, Hand::default());
+        self.predictions.reserve(BASE_DIM, panels);
+        for (array, width) in [(&mut self.actions, JOINTS), (&mut self.noise, JOINTS), (&mut self.d_first, JOINTS)] {
+            array.reserve(width, first);
+        }
+        self.d_states.reserve(BASE_DIM, first);
+        self.d_states.span_mut(&(0..first)).fill(Lanes::default());
+        self.gradient.clear();
+        self.gradient.resize(policy.net.params().len(), 0.0);
+        self.d_log_std = [0.0; JOINTS];
+        self.loss = 0.0;
+        for (i, segment) in self.segments.iter().enumerate() {
+            let demo_row = batch.rows[segment.start];
+            self.states.write_row(i, batch.corpus.state(demo_row));
+            self.model.input.write_row(i, &row(batch.model_inputs, dynamics.inputs(), demo_row)[..dynamics.features().width()]);
+        }
+        self.states.clear_tail(self.segments.len());
+        self.model.input.clear_tail(self.segments.len());
     }
 
     /// One step forward: a_t from the policy, s_{t+1} from the dynamics network.
     fn advance(&mut self, depth: Depth, policy: &Policy, dynamics: &Dynamics, batch: Batch, choices: &Choices) {
-        let Depth { j, from, later, count, .. } = depth;
-        let dim = batch.corpus.task.state_dim();
-        let (width, seen) = (policy.net.inputs(), dynamics.features().width());
-        if j > 0 {
-            for i in 0..count {
-                let (state, hand) = (row(&self.states, dim, later + i), &self.hands[later + i]);
-                policy.features().forward(state, hand, &mut self.policy.input[(later + i) * width..(later + i + 1) * width]);
-                let at = (from + i) * dynamics.inputs();
-                dynamics.features().forward(state, hand, &mut self.model.input[at..at + seen]);
+        let seen = dynamics.features().width();
+        if depth.j > 0 {
+            let sees_hand = if policy.features().needs_hand() { policy.features() } else { dynamics.features() };
+            for (_, at, later) in depth.places() {
+                let state = self.states.panel(at);
+                self.hands[at] = sees_hand.hand(state);
+                policy.features().forward(state, &self.hands[at], self.policy.input.panel_mut(later));
+                dynamics.features().forward(state, &self.hands[at], &mut self.model.input.panel_mut(at)[..seen]);
             }
-            policy.net.forward(&mut self.policy, later..later + count);
+            policy.net.forward(&mut self.policy, depth.later..depth.later + depth.panels);
         }
-        for i in 0..count {
-            let action = self.action(depth, i, policy, batch, choices);
-            self.actions[i * JOINTS..(i + 1) * JOINTS].copy_from_slice(&action);
-            let input = &mut self.model.input[(from + i) * dynamics.inputs()..(from + i + 1) * dynamics.inputs()];
-            if j == 0 {
-                let demo_row = batch.rows[self.segments[i].start];
-                input[..seen].copy_from_slice(&row(batch.model_inputs, dynamics.inputs(), demo_row)[..seen]);
-            }
-            dynamics.write_action(&action, &mut input[seen..]);
+        self.act(depth, policy, batch, choices);
+        for (p, at, _) in depth.places() {
+            dynamics.write_action(self.actions.panel(p), &mut self.model.input.panel_mut(at)[seen..]);
         }
-        dynamics.net.forward(&mut self.model, from..from + count);
-        self.store_predictions(depth, policy, dynamics, batch);
+        dynamics.net.forward(&mut self.model, depth.from..depth.from + depth.panels);
+        for (p, at, _) in depth.places() {
+            let (state, output) = (self.states.panel(at), self.model.output.panel(at));
+            dynamics.write_next(state, self.actions.panel(p), output, self.predictions.panel_mut(at));
+        }
+        for p in 0..panels_of(depth.next_count) {
+            let (from, to) = (depth.from + p, depth.from + depth.panels + p);
+            let dim = self.states.width();
+            let (before, after) = self.states.split_at_mut(to);
+            let next = &mut after[..dim];
+            next[..BASE_DIM].copy_from_slice(self.predictions.panel(from));
+            next[BASE_DIM..].copy_from_slice(&before[from * dim..(from + 1) * dim][BASE_DIM..]);
+        }
+        self.states.clear_tail((depth.from + depth.panels) * LANES + depth.next_count);
     }
 
-    /// Predictions of this depth from the dynamics network's output, and the states of the next depth.
-    fn store_predictions(&mut self, depth: Depth, policy: &Policy, dynamics: &Dynamics, batch: Batch) {
-        let Depth { j, from, later, count, next_count } = depth;
-        let (corpus, dim) = (batch.corpus, batch.corpus.task.state_dim());
-        let sees_hand = if policy.features().needs_hand() { policy.features() } else { dynamics.features() };
-        let after = later + if j > 0 { count } else { 0 };
-        for i in 0..count {
-            let start = self.segments[i].start;
-            let action = row(&self.actions, JOINTS, i);
-            let state = if j == 0 { corpus.state(batch.rows[start]) } else { row(&self.states, dim, later + i) };
-            let prediction = &mut self.predictions[(from + i) * BASE_DIM..(from + i + 1) * BASE_DIM];
-            dynamics.write_next(state, action, row(&self.model.output, BASE_DIM, from + i), prediction);
-            if i < next_count {
-                let next = &mut self.states[(after + i) * dim..(after + i + 1) * dim];
-                next[..BASE_DIM].copy_from_slice(prediction);
-                next[BASE_DIM..].copy_from_slice(&corpus.state(batch.rows[start])[BASE_DIM..]);
-                self.hands[after + i] = sees_hand.hand(next);
+    /// The actions of this depth \[rad/s\].
+    fn act(&mut self, depth: Depth, policy: &Policy, batch: Batch, choices: &Choices) {
+        let sampled = choices.action == ActionChoice::Sample;
+        for (p, _, later) in depth.places() {
+            for i in depth.segments(p) {
+                let transition = self.segments[i].start + depth.j;
+                if depth.j == 0 {
+                    self.actions.write_row(i, row(batch.mean, JOINTS, transition));
+                }
+                if sampled {
+                    self.noise.write_row(i, row(batch.noise, JOINTS, transition));
+                }
+            }
+            if depth.j > 0 {
+                self.actions.panel_mut(p).copy_from_slice(self.policy.output.panel(later));
+            }
+            let (actions, noise) = (self.actions.panel_mut(p), self.noise.panel(p));
+            for (k, (action, eps)) in actions.iter_mut().zip(noise).enumerate() {
+                let shift = if sampled { *eps * policy.log_std[k].exp() } else { Lanes::default() };
+                *action = (*action + shift).map(|mean| policy.action_scaling().undo(k, mean));
             }
         }
-    }
-
-    /// a_t of segment `i` at this depth \[rad/s\].
-    fn action(&self, depth: Depth, i: usize, policy: &Policy, batch: Batch, choices: &Choices) -> [f32; JOINTS] {
-        let transition = self.segments[i].start + depth.j;
-        let mean = match depth.j {
-            0 => row(batch.mean, JOINTS, transition),
-            _ => row(&self.policy.output, JOINTS, depth.later + i),
-        };
-        std::array::from_fn(|k| {
-            let shift = match choices.action {
-                ActionChoice::Sample => policy.log_std[k].exp() * batch.noise[transition * JOINTS + k],
-                ActionChoice::Mean => 0.0,
-            };
-            policy.action_scaling().undo(k, mean[k] + shift)
-        })
+        self.actions.clear_tail(depth.count);
     }
 
     /// One step back. On entry the first `next_count` rows of `d_states` hold the gradient with respect to the next states as inputs of
     /// the next step, the others are 0; on return all rows hold it for this depth's states.
     fn retrace(&mut self, depth: Depth, policy: &Policy, dynamics: &Dynamics, batch: Batch, choices: &Choices) {
-        let Depth { j, from, later, count, .. } = depth;
-        let scale = choices.scale(batch.rows.len(), batch.demos);
-        let residual = &dynamics.residual_scaling().std;
-        for i in 0..count {
-            let target = row(&batch.corpus.next, BASE_DIM, batch.rows[self.segments[i].start + j]);
-            let prediction = row(&self.predictions, BASE_DIM, from + i);
-            let d_state = &mut self.d_states[i * BASE_DIM..(i + 1) * BASE_DIM];
-            let d_output = &mut self.model.d_output[(from + i) * BASE_DIM..(from + i + 1) * BASE_DIM];
-            let mut loss = 0.0f32;
-            for k in 0..BASE_DIM {
-                let error = prediction[k] - target[k];
-                loss += choices.weights[k] * error * error;
-                d_state[k] += 2.0 * scale * choices.weights[k] * error;
-                d_output[k] = d_state[k] * residual[k];
-            }
-            self.loss += f64::from(scale * loss);
+        for (p, at, _) in depth.places() {
+            self.add_loss(depth, p, at, dynamics, batch, choices);
         }
-        dynamics.net.backward(&mut self.model, from..from + count);
-        dynamics.net.backward_input(&mut self.model, from..from + count);
-        for i in 0..count {
-            let d_mean = self.d_mean(depth, i, policy, dynamics, batch, choices);
-            let (array, at) = if j == 0 { (&mut self.d_first, i) } else { (&mut self.policy.d_output, later + i) };
-            array[at * JOINTS..(at + 1) * JOINTS].copy_from_slice(&d_mean);
-        }
-        if j == 0 {
+        let all = depth.from..depth.from + depth.panels;
+        dynamics.net.backward(&mut self.model, all.clone());
+        dynamics.net.backward_input(&mut self.model, all);
+        self.retrace_actions(depth, policy, dynamics, batch, choices);
+        if depth.j == 0 {
             return;
         }
-        policy.net.backward(&mut self.policy, later..later + count);
-        policy.net.backward_input(&mut self.policy, later..later + count);
-        let (dim, width, model_width) = (batch.corpus.task.state_dim(), policy.net.inputs(), dynamics.inputs());
-        for i in 0..count {
-            let d_state = &mut self.d_states[i * BASE_DIM..(i + 1) * BASE_DIM];
+        let all = depth.later..depth.later + depth.panels;
+        policy.net.backward(&mut self.policy, all.clone());
+        policy.net.backward_input(&mut self.policy, all);
+        for (p, at, later) in depth.places() {
+            let d_state = self.d_states.panel_mut(p);
             if dynamics.structure() == Structure::Kinematic {
-                d_state[JOINTS..2 * JOINTS].fill(0.0); // dq' = a + network does not see dq
+                d_state[JOINTS..2 * JOINTS].fill(Lanes::default()); // dq' = a + network does not see dq
             }
-            let (state, hand) = (row(&self.states, dim, later + i), &self.hands[later + i]);
-            let (input, d_input) = (row(&self.policy.input, width, later + i), row(&self.policy.d_input, width, later + i));
+            let (state, hand) = (self.states.panel(at), &self.hands[at]);
+            let (input, d_input) = (self.policy.input.panel(later), self.policy.d_input.panel(later));
             policy.features().backward(state, hand, input, d_input, d_state);
-            let input = row(&self.model.input, model_width, from + i);
-            let d_input = row(&self.model.d_input, model_width, from + i);
+            let (input, d_input) = (self.model.input.panel(at), self.model.d_input.panel(at));
             dynamics.features().backward(state, hand, input, d_input, d_state);
         }
     }
 
-    /// Gradient with respect to a mean action; adds the log standard deviations' where the action was sampled.
-    fn d_mean(
-        &mut self,
-        depth: Depth,
-        i: usize,
-        policy: &Policy,
-        dynamics: &Dynamics,
-        batch: Batch,
-        choices: &Choices,
-    ) -> [f32; JOINTS] {
+    /// Adds the loss of panel `p` of this depth and its gradient with respect to the predictions, and hands that to the dynamics network.
+    fn add_loss(&mut self, depth: Depth, p: usize, at: usize, dynamics: &Dynamics, batch: Batch, choices: &Choices) {
+        let scale = choices.scale(batch.rows.len(), batch.demos);
+        let mut targets = [Lanes::default(); BASE_DIM];
+        targets.copy_from_slice(self.predictions.panel(at)); // no error where there is no segment
+        for (lane, i) in depth.segments(p).enumerate() {
+            let target = row(&batch.corpus.next, BASE_DIM, batch.rows[self.segments[i].start + depth.j]);
+            targets.iter_mut().zip(target).for_each(|(slot, value)| slot.0[lane] = *value);
+        }
+        let (d_state, d_output) = (self.d_states.panel_mut(p), self.model.d_output.panel_mut(at));
+        let mut loss = Lanes::default();
+        for (k, prediction) in self.predictions.panel(at).iter().enumerate() {
+            let error = *prediction - targets[k];
+            loss += error * error * choices.weights[k];
+            d_state[k] += error * (2.0 * scale * choices.weights[k]);
+            d_output[k] = d_state[k] * dynamics.residual_scaling().std[k];
+        }
+        self.loss += loss.0.iter().map(|loss| f64::from(scale * loss)).sum::<f64>();
+    }
+
+    /// Gradient with respect to the mean actions; adds the log standard deviations' where actions were sampled.
+    fn retrace_actions(&mut self, depth: Depth, policy: &Policy, dynamics: &Dynamics, batch: Batch, choices: &Choices) {
         let seen = dynamics.features().width();
-        let d_given = &row(&self.model.d_input, dynamics.inputs(), depth.from + i)[seen..];
-        let d_state = row(&self.d_states, BASE_DIM, i);
-        let (given, unit) = (&dynamics.action_scaling().std, &policy.action_scaling().std);
         let kinematic = dynamics.structure() == Structure::Kinematic;
-        let at = (self.segments[i].start + depth.j) * JOINTS;
-        std::array::from_fn(|k| {
-            let known = if kinematic { DT_S * d_state[k] + d_state[JOINTS + k] } else { 0.0 };
-            let d_mean = (d_given[k] / given[k] + known) * unit[k];
+        for (p, at, later) in depth.places() {
             if choices.action == ActionChoice::Sample {
-                self.d_log_std[k] += d_mean * policy.log_std[k].exp() * batch.noise[at + k];
+                for i in depth.segments(p) {
+                    self.noise.write_row(i, row(batch.noise, JOINTS, self.segments[i].start + depth.j));
+                }
             }
-            d_mean
-        })
+            let (d_given, d_state) = (&self.model.d_input.panel(at)[seen..], self.d_states.panel(p));
+            let d_mean = if depth.j == 0 { self.d_first.panel_mut(p) } else { self.policy.d_output.panel_mut(later) };
+            for k in 0..JOINTS {
+                let known = if kinematic { d_state[k] * DT_S + d_state[JOINTS + k] } else { Lanes::default() };
+                d_mean[k] = (d_given[k] / dynamics.action_scaling().std[k] + known) * policy.action_scaling().std[k];
+                if choices.action == ActionChoice::Sample {
+                    self.d_log_std[k] += (d_mean[k] * self.noise.panel(p)[k]).sum() * policy.log_std[k].exp();
+                }
+            }
+        }
     }
 
     /// Adds the gradient with respect to the first mean actions to `d_first` (rows of the batch x 9).
     pub fn scatter_first(&self, d_first: &mut [f32]) {
-        for (segment, d) in self.segments.iter().zip(self.d_first.chunks_exact(JOINTS)) {
-            d_first[segment.start * JOINTS..(segment.start + 1) * JOINTS].copy_from_slice(d);
+        for (i, segment) in self.segments.iter().enumerate() {
+            self.d_first.read_row(i, &mut d_first[segment.start * JOINTS..(segment.start + 1) * JOINTS]);
         }
     }
 }

@@ -4,6 +4,8 @@ use std::ops::Range;
 
 /// Most shards of a batch: two for each of two cores evens out the load, more would only make the matrices thinner.
 pub const MAX_SHARDS: usize = 4;
+/// Most shards of the segments of state cloning: their matrices grow thin with depth anyway.
+pub const MAX_SEGMENT_SHARDS: usize = 2;
 /// Rows below which a matrix product no longer pays for a shard of its own.
 const MIN_ROWS: usize = 64;
 

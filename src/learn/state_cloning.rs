@@ -142,7 +142,7 @@ pub fn state_cloning(
     work.sorted.clear();
     work.sorted.extend_from_slice(segments);
     work.sorted.sort_unstable_by_key(|s| (std::cmp::Reverse(s.steps), s.start));
-    work.active = shards::count(batch.rows.len());
+    work.active = shards::count(batch.rows.len()).min(shards::MAX_SEGMENT_SHARDS);
     work.rollouts.resize_with(work.active.max(work.rollouts.len()), Rollout::default);
     let (active, sorted) = (work.active, &work.sorted);
     work.rollouts[..active].par_iter_mut().enumerate().for_each(|(i, rollout)| {

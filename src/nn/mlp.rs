@@ -2,9 +2,11 @@
 
 use super::Pass;
 use super::activation::Activation;
-use super::matmul::{Shape, add_forward, add_weight_gradient, input_gradient};
+use super::kernel::{Coefficients, Start, prefetch, product};
+use super::lanes::Lanes;
+use super::pass::BLOCK_PANELS;
 use rand::{Rng, RngExt};
-use std::ops::Range;
+use std::ops::{Deref, DerefMut, Range};
 
 /// Layers widths\[0\] -> widths\[1\] -> ... -> widths\[last\]; all but the last are followed by the activation.
 #[derive(Clone, Debug, PartialEq)]
@@ -12,14 +14,17 @@ pub struct Mlp {
     widths: Vec<usize>,
     activation: Activation,
     params: Vec<f32>,
+    /// The weights once more, each layer outputs x inputs in the place where `params` has it; the biases' places are not used.
+    transposed: Vec<f32>,
 }
 
-/// Rows that go through all layers before the next rows do, so that their activations stay in the processor's cache.
-const BLOCK_ROWS: usize = 128;
+/// Panels that go through all layers before the next do: two layers of them fit into a core's first cache, beside the weights.
+const STEP_PANELS: usize = 2;
 
-fn blocks(rows: Range<usize>) -> impl Iterator<Item = Range<usize>> {
-    let end = rows.end;
-    rows.step_by(BLOCK_ROWS).map(move |from| from..end.min(from + BLOCK_ROWS))
+/// A range in blocks of `size`.
+pub fn blocks(panels: Range<usize>, size: usize) -> impl Iterator<Item = Range<usize>> {
+    let end = panels.end;
+    panels.step_by(size).map(move |from| from..end.min(from + size))
 }
 
 impl Mlp {
@@ -34,12 +39,29 @@ impl Mlp {
             let bound = 1.0 / (pair[0] as f32).sqrt();
             params.extend((0..(pair[0] + 1) * pair[1]).map(|_| bound * (2.0 * rng.random::<f32>() - 1.0)));
         }
-        Mlp { widths: widths.to_vec(), activation, params }
+        Self::with_params(widths, activation, params)
+    }
+
+    fn with_params(widths: &[usize], activation: Activation, params: Vec<f32>) -> Self {
+        let mut mlp = Mlp { widths: widths.to_vec(), activation, transposed: vec![0.0; params.len()], params };
+        mlp.transpose();
+        mlp
+    }
+
+    fn transpose(&mut self) {
+        for layer in 0..self.layers() {
+            let (weights, _) = self.layer_ranges(layer);
+            let (inputs, outputs) = (self.widths[layer], self.widths[layer + 1]);
+            let (from, to) = (&self.params[weights.clone()], &mut self.transposed[weights]);
+            for (i, row) in from.chunks_exact(outputs).enumerate() {
+                row.iter().enumerate().for_each(|(o, w)| to[o * inputs + i] = *w);
+            }
+        }
     }
 
     /// From parameters, laid out as [`Mlp::params`]; `None` when their number does not fit.
     pub fn from_params(widths: &[usize], activation: Activation, params: Vec<f32>) -> Option<Self> {
-        (widths.len() >= 3 && params.len() == Self::count(widths)).then(|| Mlp { widths: widths.to_vec(), activation, params })
+        (widths.len() >= 3 && params.len() == Self::count(widths)).then(|| Self::with_params(widths, activation, params))
     }
 
     fn count(widths: &[usize]) -> usize {
@@ -62,8 +84,8 @@ impl Mlp {
     }
 
     /// The same, to be changed.
-    pub fn params_mut(&mut self) -> &mut [f32] {
-        &mut self.params
+    pub fn params_mut(&mut self) -> ParamsMut<'_> {
+        ParamsMut { mlp: self }
     }
 
     /// Number of inputs.
@@ -88,152 +110,118 @@ impl Mlp {
         (start..start + weights, start + weights..start + weights + self.widths[layer + 1])
     }
 
-    fn shape(&self, layer: usize, rows: &Range<usize>) -> Shape {
-        Shape { rows: rows.len(), inputs: self.widths[layer], outputs: self.widths[layer + 1] }
-    }
-
-    /// Floating point operations of a forward pass over one row (backward costs the same again for the inputs and for the weights).
+    /// Floating point operations of a forward pass over one row, a multiplication and an addition counted as two (backward costs the
+    /// same again for the inputs and for the weights).
     pub fn flops_per_row(&self) -> u64 {
-        (0..self.layers()).map(|layer| self.shape(layer, &(0..1)).flops()).sum()
+        self.widths.windows(2).map(|pair| 2 * (pair[0] * pair[1]) as u64).sum()
     }
 
     /// The first layer's share of [`Mlp::flops_per_row`].
     pub fn first_layer_flops_per_row(&self) -> u64 {
-        self.shape(0, &(0..1)).flops()
+        2 * (self.widths[0] * self.widths[1]) as u64
     }
 
-    /// `pass.output` of `rows` from `pass.input`.
-    pub fn forward(&self, pass: &mut Pass, rows: Range<usize>) {
-        blocks(rows).for_each(|block| self.forward_block(pass, block));
+    /// `pass.output` of these panels from `pass.input`.
+    pub fn forward(&self, pass: &mut Pass, panels: Range<usize>) {
+        blocks(panels, STEP_PANELS).for_each(|block| self.forward_block(pass, &block));
     }
 
-    fn forward_block(&self, pass: &mut Pass, rows: Range<usize>) {
+    fn forward_block(&self, pass: &mut Pass, panels: &Range<usize>) {
         for layer in 0..self.layers() {
-            let shape = self.shape(layer, &rows);
+            let (inputs, outputs) = (self.widths[layer], self.widths[layer + 1]);
             let (weights, biases) = self.layer_ranges(layer);
             let (below, above) = pass.hidden.split_at_mut(layer);
             let x = if layer == 0 { &pass.input } else { &below[layer - 1] };
             let y = if layer + 1 == self.layers() { &mut pass.output } else { &mut above[0] };
-            let y = span_mut(y, &rows, shape.outputs);
-            y.chunks_exact_mut(shape.outputs).for_each(|row| row.copy_from_slice(&self.params[biases.clone()]));
-            add_forward(shape, y, span(x, &rows, shape.inputs), &self.params[weights]);
+            let y = y.span_mut(panels);
+            let weights = Coefficients::Matrix(&self.params[weights]);
+            product(y, outputs, x.span(panels), inputs, weights, Start::Bias(&self.params[biases]));
             if layer + 1 < self.layers() {
                 self.activation.forward(y);
             }
         }
     }
 
-    /// Gradients of the hidden layers of `rows` from `pass.d_output`; they stay in the workspace for the two calls below.
-    pub fn backward(&self, pass: &mut Pass, rows: Range<usize>) {
-        blocks(rows).for_each(|block| self.backward_block(pass, block));
+    /// Gradients of the hidden layers of these panels from `pass.d_output`; they stay in the workspace for the two calls below.
+    pub fn backward(&self, pass: &mut Pass, panels: Range<usize>) {
+        blocks(panels, STEP_PANELS).for_each(|block| self.backward_block(pass, &block));
     }
 
-    fn backward_block(&self, pass: &mut Pass, rows: Range<usize>) {
+    fn backward_block(&self, pass: &mut Pass, panels: &Range<usize>) {
         for layer in (1..self.layers()).rev() {
-            let shape = self.shape(layer, &rows);
-            let (weights, _) = self.layer_ranges(layer);
             let (below, above) = pass.d_hidden.split_at_mut(layer);
             let dy = if layer + 1 == self.layers() { &pass.d_output } else { &above[0] };
-            let dx = span_mut(&mut below[layer - 1], &rows, shape.inputs);
-            input_gradient(shape, dx, span(dy, &rows, shape.outputs), &self.params[weights]);
-            self.activation.backward(dx, span(&pass.hidden[layer - 1], &rows, shape.inputs));
+            let (dx, y) = (below[layer - 1].span_mut(panels), pass.hidden[layer - 1].span(panels));
+            prefetch(y);
+            self.input_gradient(layer, dx, dy.span(panels));
+            self.activation.backward(dx, y);
         }
     }
 
-    /// `pass.d_input` of `rows`, after [`Mlp::backward`].
-    pub fn backward_input(&self, pass: &mut Pass, rows: Range<usize>) {
-        let shape = self.shape(0, &rows);
-        let (weights, _) = self.layer_ranges(0);
-        let dx = span_mut(&mut pass.d_input, &rows, shape.inputs);
-        input_gradient(shape, dx, span(&pass.d_hidden[0], &rows, shape.outputs), &self.params[weights]);
+    /// `pass.d_input` of these panels, after [`Mlp::backward`].
+    pub fn backward_input(&self, pass: &mut Pass, panels: Range<usize>) {
+        self.input_gradient(0, pass.d_input.span_mut(&panels), pass.d_hidden[0].span(&panels));
     }
 
-    /// Adds the parameters' gradient over `rows` to `gradient`, after [`Mlp::backward`].
+    /// dx = dy w^T.
+    fn input_gradient(&self, layer: usize, dx: &mut [Lanes], dy: &[Lanes]) {
+        let (weights, _) = self.layer_ranges(layer);
+        let transposed = Coefficients::Matrix(&self.transposed[weights]);
+        product(dx, self.widths[layer], dy, self.widths[layer + 1], transposed, Start::Zero);
+    }
+
+    /// Starts the sum of the parameters' gradient in the workspace.
+    pub fn begin_gradient(&self, pass: &mut Pass) {
+        pass.sums.begin(&self.widths);
+    }
+
+    /// Adds these panels to the sum, after [`Mlp::backward`].
+    pub fn add_gradient(&self, pass: &mut Pass, panels: Range<usize>) {
+        for block in blocks(panels, BLOCK_PANELS) {
+            for layer in 0..self.layers() {
+                let (inputs, outputs) = (self.widths[layer], self.widths[layer + 1]);
+                let x = if layer == 0 { &pass.input } else { &pass.hidden[layer - 1] };
+                let dy = if layer + 1 == self.layers() { &pass.d_output } else { &pass.d_hidden[layer] };
+                pass.sums.add(layer, x.span(&block), inputs, dy.span(&block), outputs);
+            }
+        }
+    }
+
+    /// Adds the sum to `gradient`, laid out as the parameters.
     ///
     /// # Panics
     /// When `gradient` is shorter than the parameters.
-    pub fn add_gradient(&self, pass: &Pass, rows: Range<usize>, gradient: &mut [f32]) {
-        blocks(rows).for_each(|block| self.add_gradient_block(pass, block, gradient));
-    }
-
-    fn add_gradient_block(&self, pass: &Pass, rows: Range<usize>, gradient: &mut [f32]) {
+    pub fn finish_gradient(&self, pass: &Pass, gradient: &mut [f32]) {
         for layer in 0..self.layers() {
-            let shape = self.shape(layer, &rows);
             let (weights, biases) = self.layer_ranges(layer);
-            let x = if layer == 0 { &pass.input } else { &pass.hidden[layer - 1] };
-            let dy = if layer + 1 == self.layers() { &pass.d_output } else { &pass.d_hidden[layer] };
-            let dy = span(dy, &rows, shape.outputs);
-            add_weight_gradient(shape, &mut gradient[weights], span(x, &rows, shape.inputs), dy);
-            let d_bias = &mut gradient[biases];
-            dy.chunks_exact(shape.outputs).for_each(|row| d_bias.iter_mut().zip(row).for_each(|(sum, d)| *sum += d));
+            pass.sums.add_to(layer, &mut gradient[weights.start..biases.end], self.widths[layer + 1]);
         }
     }
 }
 
-fn span<'a>(array: &'a [f32], rows: &Range<usize>, width: usize) -> &'a [f32] {
-    &array[rows.start * width..rows.end * width]
+/// The parameters on loan; when they come back, what is derived from them is brought up to date.
+pub struct ParamsMut<'a> {
+    mlp: &'a mut Mlp,
 }
 
-fn span_mut<'a>(array: &'a mut [f32], rows: &Range<usize>, width: usize) -> &'a mut [f32] {
-    &mut array[rows.start * width..rows.end * width]
+impl Deref for ParamsMut<'_> {
+    type Target = [f32];
+    fn deref(&self) -> &[f32] {
+        &self.mlp.params
+    }
+}
+
+impl DerefMut for ParamsMut<'_> {
+    fn deref_mut(&mut self) -> &mut [f32] {
+        &mut self.mlp.params
+    }
+}
+
+impl Drop for ParamsMut<'_> {
+    fn drop(&mut self) {
+        self.mlp.transpose();
+    }
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::seed::stream;
-
-    /// L = sum c_k y_k^2 over all rows; its derivative by finite differences against backward, for parameters and inputs.
-    #[test]
-    fn gradients_of_every_layer_equal_finite_differences() {
-        for activation in [Activation::Tanh, Activation::Relu] {
-            let mut rng = stream(1, "mlp", 0);
-            let mut mlp = Mlp::new(&[4, 7, 6, 3], activation, &mut rng);
-            let rows = 5;
-            let mut pass = Pass::new(&mlp, rows);
-            pass.input.iter_mut().for_each(|v| *v = 2.0 * rng.random::<f32>() - 1.0);
-            let loss = |mlp: &Mlp, pass: &mut Pass| -> f64 {
-                mlp.forward(pass, 0..rows);
-                pass.output.iter().enumerate().map(|(k, y)| (1.0 + k as f64) * f64::from(*y).powi(2)).sum()
-            };
-            loss(&mlp, &mut pass);
-            for k in 0..pass.output.len() {
-                pass.d_output[k] = 2.0 * (1.0 + k as f32) * pass.output[k];
-            }
-            mlp.backward(&mut pass, 0..2);
-            mlp.backward(&mut pass, 2..rows);
-            mlp.backward_input(&mut pass, 0..rows);
-            let mut gradient = vec![0.0; mlp.params().len()];
-            mlp.add_gradient(&pass, 0..3, &mut gradient);
-            mlp.add_gradient(&pass, 3..rows, &mut gradient);
-            let h = 2e-3f32;
-            let check = |analytic: f32, plus: f64, minus: f64, what: &str| {
-                let numeric = (plus - minus) / f64::from(2.0 * h);
-                assert!(
-                    (numeric - f64::from(analytic)).abs() < 2e-2 * (1.0 + numeric.abs()),
-                    "{what}: {analytic} against {numeric}"
-                );
-            };
-            for (i, analytic) in gradient.iter().enumerate() {
-                let mut at = |sign: f32| {
-                    let kept = mlp.params[i];
-                    mlp.params[i] += sign * h;
-                    let value = loss(&mlp, &mut pass);
-                    mlp.params[i] = kept;
-                    value
-                };
-                check(*analytic, at(1.0), at(-1.0), &format!("{activation:?} parameter {i}"));
-            }
-            for i in 0..pass.input.len() {
-                let (kept, analytic) = (pass.input[i], pass.d_input[i]);
-                let mut at = |sign: f32| {
-                    pass.input[i] = kept + sign * h;
-                    let value = loss(&mlp, &mut pass);
-                    pass.input[i] = kept;
-                    value
-                };
-                check(analytic, at(1.0), at(-1.0), &format!("{activation:?} input {i}"));
-            }
-        }
-    }
-}
+mod tests;

@@ -1,17 +1,19 @@
 //! Small multilayer perceptrons: forward and backward side by side, a Gaussian head, Adam. Knows nothing of robots.
 //!
-//! All arrays are row-major f32, one sample a row. Nothing here allocates once its workspace ([`Pass`]) has grown to the batch.
-//! Element-wise kernels use no fused multiply-add, so that they give the same bytes on every processor; only the matrix products
-//! ([`matmul`]) pick a kernel by the processor's features.
+//! Samples lie in panels of eight rows ([`lanes`]), parameters in flat row-major arrays, all f32. Nothing here allocates once its
+//! workspace ([`Pass`]) has grown to the batch. Matrix products and tanh ([`kernel`]) pick their instructions by the processor's
+//! features; everything else uses no fused multiply-add and gives the same bytes on every processor.
 
 pub mod activation;
 pub mod adam;
 pub mod gaussian;
-pub mod matmul;
+pub mod kernel;
+pub mod lanes;
 pub mod mlp;
 mod pass;
 
 pub use activation::Activation;
 pub use adam::{Adam, Ema, clip_by_global_norm, cosine, global_norm};
-pub use mlp::Mlp;
-pub use pass::Pass;
+pub use lanes::{LANES, Lanes, Panels, panels_of};
+pub use mlp::{Mlp, blocks};
+pub use pass::{BLOCK_PANELS, Pass};

@@ -1,0 +1,123 @@
+//! The kernels of every path against plain loops.
+
+use super::*;
+use std::cmp::Ordering;
+
+fn paths() -> Vec<Path> {
+    let mut paths = vec![Path::Portable];
+    if Path::best() != Path::Portable {
+        paths.push(Path::best());
+    }
+    paths
+}
+
+fn value(i: usize) -> f32 {
+    ((i * 37 % 101) as f32 - 50.0) / 40.0
+}
+
+fn lanes(n: usize, from: usize) -> Vec<Lanes> {
+    (0..n).map(|i| Lanes(std::array::from_fn(|l| value(from + i * LANES + l)))).collect()
+}
+
+/// Every size of tile and every remainder, both kinds of coefficients and all starts, on every path.
+#[test]
+fn products_equal_plain_loops() {
+    for path in paths() {
+        for panels in 0..=5 {
+            for (depth, width) in (1..=25).map(|width| (24, width)).chain([(1, 7), (9, 4), (44, 100), (100, 9), (3, 31)]) {
+                let x = lanes(panels * depth, 1);
+                let (matrix, bias) = ((0..depth * width).map(value).collect::<Vec<_>>(), lanes(width, 5));
+                let bias: Vec<f32> = bias.iter().map(|b| b.0[3]).collect();
+                let samples = lanes(depth * width / LANES, 9);
+                let before = lanes(panels * width, 2);
+                let check = |a: Coefficients, start: Start, at: &dyn Fn(usize, usize) -> f32| {
+                    let mut result = before.clone();
+                    product_on(path, &mut result, width, &x, depth, a, start);
+                    for (i, l) in (0..panels * width).flat_map(|i| (0..LANES).map(move |l| (i, l))) {
+                        let (p, f) = (i / width, i % width);
+                        let first = match start {
+                            Start::Zero => 0.0,
+                            Start::Result => before[i].0[l],
+                            Start::Bias(bias) => bias[f],
+                        };
+                        let sum = first + (0..depth).map(|k| at(k, f) * x[p * depth + k].0[l]).sum::<f32>();
+                        let got = result[i].0[l];
+                        assert!((got - sum).abs() < 1e-4, "{path:?} {panels} {depth} {width}, {p} {f} {l}: {got}, not {sum}");
+                    }
+                };
+                for start in [Start::Zero, Start::Result, Start::Bias(&bias)] {
+                    check(Coefficients::Matrix(&matrix), start, &|k, f| matrix[k * width + f]);
+                    if depth % LANES == 0 {
+                        let at = |k: usize, f: usize| samples[k / LANES * width + f].0[k % LANES];
+                        check(Coefficients::Samples(&samples), start, &at);
+                    }
+                }
+            }
+        }
+    }
+}
+
+#[test]
+#[should_panic(expected = "a matrix is 3 x 2")]
+fn a_matrix_of_another_size_is_refused() {
+    product(&mut lanes(2, 0), 2, &lanes(3, 0), 3, Coefficients::Matrix(&[0.0; 5]), Start::Zero);
+}
+
+#[test]
+fn tanh_is_close_everywhere_and_keeps_nan() {
+    let xs: Vec<f32> = (-120_000..=120_000).map(|i| i as f32 * 1e-4).chain([-0.0, 1e-30, 50.0, -1e30, f32::INFINITY]).collect();
+    for path in paths() {
+        for x in xs.chunks(LANES) {
+            let mut y = [Lanes(std::array::from_fn(|i| x[i % x.len()]))];
+            tanh_on(path, &mut y);
+            for (x, y) in x.iter().zip(y[0].0) {
+                assert!((f64::from(y) - f64::from(*x).tanh()).abs() < 3e-7, "{path:?}: tanh({x}) = {y}");
+            }
+        }
+        let mut y = [Lanes::splat(f32::NAN)];
+        tanh_on(path, &mut y);
+        assert!(y[0].0.iter().all(|v| v.is_nan()));
+    }
+}
+
+#[test]
+fn tanh_backward_is_the_slope_times_the_gradient() {
+    for path in paths() {
+        let (mut d, y) = (lanes(5, 3), lanes(5, 20));
+        let before = d.clone();
+        tanh_backward_on(path, &mut d, &y);
+        for (i, l) in (0..5).flat_map(|i| (0..LANES).map(move |l| (i, l))) {
+            let expected = before[i].0[l] * (1.0 - y[i].0[l] * y[i].0[l]);
+            assert!((d[i].0[l] - expected).abs() < 1e-6, "{path:?}");
+        }
+    }
+}
+
+#[test]
+fn transposing_turns_entries_into_lanes() {
+    for path in paths() {
+        for (panels, entries) in [(1, 8), (2, 11), (3, 5), (2, 16)] {
+            let from = lanes(panels * entries, 7);
+            let samples = panels * LANES;
+            let mut to = vec![Lanes::splat(9.0); samples * (entries + 1).div_ceil(LANES)];
+            transpose_on(path, &mut to, &from, entries);
+            for (r, i) in (0..samples).flat_map(|r| (0..(entries + 1).next_multiple_of(LANES)).map(move |i| (r, i))) {
+                let expected = match i.cmp(&entries) {
+                    Ordering::Less => from[r / LANES * entries + i].0[r % LANES],
+                    Ordering::Equal => 1.0,
+                    Ordering::Greater => 0.0,
+                };
+                assert_eq!(to[i / LANES * samples + r].0[i % LANES], expected, "{path:?}, sample {r}, entry {i}");
+            }
+        }
+    }
+}
+
+#[test]
+fn parts_cover_a_range_evenly() {
+    for (n, most) in [(0, 6), (1, 6), (9, 6), (100, 6), (25, 10)] {
+        let parts: Vec<_> = parts(n, most).collect();
+        assert_eq!(parts.iter().flat_map(|p| p.clone()).collect::<Vec<_>>(), (0..n).collect::<Vec<_>>());
+        assert!(parts.iter().all(|p| p.len() <= most && p.len() + 1 >= n.div_ceil(n.div_ceil(most).max(1))));
+    }
+}

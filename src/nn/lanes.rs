@@ -1,0 +1,215 @@
+//! Eight rows side by side, and matrices made of them.
+//!
+//! A matrix of samples is cut into *panels* of eight rows; a panel holds entry after entry, each of them for its eight rows at once.
+//! One instruction then works on eight samples, whatever the width of the matrix, and a row past the last is a lane left idle.
+
+use std::ops::{Add, AddAssign, Div, Mul, Neg, Range, Sub};
+
+/// Rows of a panel: what one AVX2 register holds.
+pub const LANES: usize = 8;
+
+/// One entry of eight rows.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[repr(C, align(32))]
+pub struct Lanes(pub [f32; LANES]);
+
+impl Lanes {
+    /// The same number in all lanes.
+    #[inline(always)]
+    pub fn splat(value: f32) -> Self {
+        Lanes([value; LANES])
+    }
+
+    /// A function of every lane.
+    #[inline(always)]
+    pub fn map(self, f: impl Fn(f32) -> f32) -> Self {
+        Lanes(self.0.map(f))
+    }
+
+    #[inline(always)]
+    fn zip(self, other: Self, f: impl Fn(f32, f32) -> f32) -> Self {
+        Lanes(std::array::from_fn(|i| f(self.0[i], other.0[i])))
+    }
+
+    /// Sum of the lanes, always in the same order.
+    #[inline]
+    pub fn sum(self) -> f32 {
+        let [a, b, c, d, e, f, g, h] = self.0;
+        ((a + e) + (b + f)) + ((c + g) + (d + h))
+    }
+}
+
+impl Add for Lanes {
+    type Output = Self;
+    #[inline(always)]
+    fn add(self, other: Self) -> Self {
+        self.zip(other, |a, b| a + b)
+    }
+}
+
+impl Sub for Lanes {
+    type Output = Self;
+    #[inline(always)]
+    fn sub(self, other: Self) -> Self {
+        self.zip(other, |a, b| a - b)
+    }
+}
+
+impl Mul for Lanes {
+    type Output = Self;
+    #[inline(always)]
+    fn mul(self, other: Self) -> Self {
+        self.zip(other, |a, b| a * b)
+    }
+}
+
+impl Mul<f32> for Lanes {
+    type Output = Self;
+    #[inline(always)]
+    fn mul(self, factor: f32) -> Self {
+        self.map(|a| a * factor)
+    }
+}
+
+impl Div<f32> for Lanes {
+    type Output = Self;
+    #[inline(always)]
+    fn div(self, divisor: f32) -> Self {
+        self.map(|a| a / divisor)
+    }
+}
+
+impl Neg for Lanes {
+    type Output = Self;
+    #[inline(always)]
+    fn neg(self) -> Self {
+        self.map(|a| -a)
+    }
+}
+
+impl AddAssign for Lanes {
+    #[inline(always)]
+    fn add_assign(&mut self, other: Self) {
+        *self = *self + other;
+    }
+}
+
+/// A matrix in panels: entry `i` of row `r` is lane `r % 8` of element `i` of panel `r / 8`.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Panels {
+    width: usize,
+    data: Vec<Lanes>,
+}
+
+impl Panels {
+    /// Room for `panels` panels of this width, all 0 where it is new; keeps what is there and never shrinks under one width.
+    pub fn reserve(&mut self, width: usize, panels: usize) {
+        if self.width != width {
+            self.data.clear();
+            self.width = width;
+        }
+        if self.data.len() < width * panels {
+            self.data.resize(width * panels, Lanes::default());
+        }
+    }
+
+    /// Number of entries of a row.
+    pub fn width(&self) -> usize {
+        self.width
+    }
+
+    /// The entries of one panel.
+    pub fn panel(&self, p: usize) -> &[Lanes] {
+        &self.data[p * self.width..(p + 1) * self.width]
+    }
+
+    /// The same, to be changed.
+    pub fn panel_mut(&mut self, p: usize) -> &mut [Lanes] {
+        &mut self.data[p * self.width..(p + 1) * self.width]
+    }
+
+    /// Several panels, one after another.
+    pub fn span(&self, panels: &Range<usize>) -> &[Lanes] {
+        &self.data[panels.start * self.width..panels.end * self.width]
+    }
+
+    /// The same, to be changed.
+    pub fn span_mut(&mut self, panels: &Range<usize>) -> &mut [Lanes] {
+        &mut self.data[panels.start * self.width..panels.end * self.width]
+    }
+
+    /// All panels before `p`, and the rest.
+    pub fn split_at_mut(&mut self, p: usize) -> (&[Lanes], &mut [Lanes]) {
+        let (before, after) = self.data.split_at_mut(p * self.width);
+        (before, after)
+    }
+
+    /// Entry `i` of row `r`.
+    #[inline]
+    pub fn get(&self, r: usize, i: usize) -> f32 {
+        self.data[r / LANES * self.width + i].0[r % LANES]
+    }
+
+    /// Sets entry `i` of row `r`.
+    #[inline]
+    pub fn set(&mut self, r: usize, i: usize, value: f32) {
+        self.data[r / LANES * self.width + i].0[r % LANES] = value;
+    }
+
+    /// Writes the first entries of row `r`.
+    #[inline]
+    pub fn write_row(&mut self, r: usize, values: &[f32]) {
+        let panel = &mut self.data[r / LANES * self.width..][..self.width];
+        let lane = r % LANES;
+        panel.iter_mut().zip(values).for_each(|(slot, v)| slot.0[lane] = *v);
+    }
+
+    /// Reads the first entries of row `r`.
+    #[inline]
+    pub fn read_row(&self, r: usize, values: &mut [f32]) {
+        let panel = &self.data[r / LANES * self.width..][..self.width];
+        let lane = r % LANES;
+        values.iter_mut().zip(panel).for_each(|(v, slot)| *v = slot.0[lane]);
+    }
+
+    /// Zeroes the lanes of row `r` and of all later rows of its panel; nothing when `r` begins a panel.
+    pub fn clear_tail(&mut self, r: usize) {
+        if !r.is_multiple_of(LANES) {
+            self.panel_mut(r / LANES).iter_mut().for_each(|slot| slot.0[r % LANES..].fill(0.0));
+        }
+    }
+}
+
+/// Panels that hold `rows` rows.
+pub fn panels_of(rows: usize) -> usize {
+    rows.div_ceil(LANES)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rows_come_back_and_tails_are_cleared() {
+        let mut panels = Panels::default();
+        panels.reserve(3, panels_of(11));
+        for r in 0..11 {
+            panels.write_row(r, &[r as f32, 10.0 + r as f32, -1.0]);
+        }
+        let mut row = [0.0; 3];
+        panels.read_row(9, &mut row);
+        assert_eq!((row, panels.get(9, 1)), ([9.0, 19.0, -1.0], 19.0));
+        assert_eq!(panels.panel(1)[0].0[..3], [8.0, 9.0, 10.0]);
+        panels.set(10, 2, 7.0);
+        panels.clear_tail(9);
+        assert_eq!(panels.panel(1)[2].0, [-1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]);
+        let kept = panels.clone();
+        panels.clear_tail(8);
+        assert_eq!(panels, kept);
+    }
+
+    #[test]
+    fn sums_take_every_lane() {
+        assert_eq!(Lanes([1.0, 2.0, 4.0, 8.0, 16.0, 32.0, 64.0, 128.0]).sum(), 255.0);
+    }
+}
