@@ -75,11 +75,6 @@ impl Task {
         BASE_DIM + [0, 3, 7][self as usize]
     }
 
-    /// Entries of the state that change during an episode (the rest are constants of it).
-    pub fn dynamic_dim(self) -> usize {
-        BASE_DIM
-    }
-
     /// The instruction in words (LeRobot's task string).
     pub fn instruction(self) -> &'static str {
         [

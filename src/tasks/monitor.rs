@@ -74,7 +74,7 @@ pub struct Monitor {
     lifted: bool,
     off_table: bool,
     solved_once: bool,
-    /// Height of the block above its support's resting height when the grip was last lost, if it was held.
+    /// Whether the block touched neither table nor base block when the grip was last lost.
     lost_in_air: bool,
     was_gripped: bool,
     paid: [bool; 4],
