@@ -81,7 +81,7 @@ impl Stage {
             Stage::Plan => &["scene", "plan"],
             Stage::Simulate => &["simulate"],
             Stage::Convert => &["convert"],
-            Stage::Pretrain => &["pretrain"],
+            Stage::Pretrain => &["scene", "simulate", "pretrain"],
             Stage::Train => &["train"],
             Stage::Evaluate => &["scene", "plan", "simulate", "evaluate"],
         }

@@ -103,7 +103,7 @@ fn warm_start(
             let cloned = learner.behavior_cloning(rows, rows.len() as f64 / learner.mean_length())?;
             metrics.learning_rate =
                 cosine(settings.warm_start_learning_rate, settings.final_learning_rate, learner.updates, total);
-            learner.update(0.0, metrics.learning_rate);
+            learner.update(0.0, 1.0, metrics.learning_rate);
             l_bc.add(cloned.l_bc);
             d_conv.add(cloned.d_conv);
         }
@@ -139,10 +139,11 @@ fn hybrid_imitation_learning(
             let mixed = if alpha > 0.0 { (1.0 - alpha) * cloned.l_bc + alpha * sc } else { cloned.l_bc }; // Eq. 1
             if i == 0 {
                 (metrics.grad_bc, metrics.grad_sc) = learner.gradient_norms(alpha > 0.0);
+                mixing.see_norms(metrics.grad_bc, metrics.grad_sc);
             }
             let step = epoch * per_epoch + i as u64;
             let rate = cosine(settings.learning_rate, settings.final_learning_rate, step, settings.epochs * per_epoch);
-            learner.update(alpha, rate); // Eq. 2
+            learner.update(alpha, mixing.sc_scale(), rate); // Eq. 2
             if settings.fine_tune_dynamics && mixing.alpha != Alpha::Fixed(0.0) {
                 l_model.add(learner.fine_tune(&rows)?); // Eq. 6, on observed transitions only
             }
@@ -168,12 +169,32 @@ struct Mixing {
     /// Share of the past in the average; 0 follows d_conv at once.
     keep: f64,
     average: Option<f64>,
+    /// Whether the gradient of L_SC is scaled to the length of that of L_BC.
+    balance: bool,
+    /// Mean of the logarithm of the ratio of the two lengths, over the last epochs.
+    log_ratio: Option<f64>,
 }
+
+/// Share of the past in the mean ratio of the gradients' lengths, which is measured once an epoch.
+const RATIO_KEEP: f64 = 0.8;
 
 impl Mixing {
     fn new(alpha: Alpha, settings: &TrainSettings, updates_per_epoch: u64) -> Self {
         let keep = if settings.alpha_average { 1.0 - 1.0 / updates_per_epoch.max(1) as f64 } else { 0.0 };
-        Mixing { alpha, cap: settings.alpha_max, keep, average: None }
+        Mixing { alpha, cap: settings.alpha_max, keep, average: None, balance: settings.sc_balance, log_ratio: None }
+    }
+
+    /// Takes in the lengths of the gradients of L_BC and L_SC at an epoch's first update.
+    fn see_norms(&mut self, bc: f64, sc: f64) {
+        let now = (bc / sc).ln();
+        if now.is_finite() {
+            self.log_ratio = Some(self.log_ratio.map_or(now, |past| RATIO_KEEP * past + (1.0 - RATIO_KEEP) * now));
+        }
+    }
+
+    /// Factor of L_SC.
+    fn sc_scale(&self) -> f64 {
+        if self.balance { self.log_ratio.map_or(1.0, f64::exp) } else { 1.0 }
     }
 
     fn weight(&mut self, d_conv: f64) -> f64 {

@@ -15,6 +15,7 @@ mod metrics;
 mod model_report;
 mod policy;
 pub mod pretrain_dynamics;
+mod pushes;
 mod regression;
 mod rollout;
 mod scaling;
