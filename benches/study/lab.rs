@@ -139,6 +139,6 @@ pub fn each<C: Sync, R: Send + Clone>(
     };
     std::thread::scope(|scope| {
         let workers: Vec<_> = (0..jobs.max(1)).map(|_| scope.spawn(worker)).collect();
-        workers.into_iter().map(|w| w.join().expect("a worker that panics is a mistake here")).collect()
+        workers.into_iter().try_for_each(|w| w.join().expect("a worker that panics is a mistake here"))
     })
 }

@@ -62,7 +62,7 @@ pub const MOST_SERIES: usize = 4;
 
 // Sizes in pixels.
 const PLOT_WIDTH: f64 = 300.0;
-const PLOT_HEIGHT: f64 = 220.0;
+const PLOT_HEIGHT: f64 = 280.0;
 const LEFT: f64 = 68.0;
 const GAP: f64 = 56.0;
 const RIGHT: f64 = 20.0;

@@ -12,8 +12,9 @@ use rand::{Rng, RngExt};
 pub const REST_HEIGHT_M: f64 = BLOCK_EDGE_M / 2.0;
 /// Room between a spawned block and a box or the base block \[m\]: the opened hand must fit.
 const CLEARANCE_M: f64 = 0.02;
-/// Distances from the arm's foot that the level hand reaches \[m\]: nothing is drawn nearer or farther.
-const REACH_M: [f64; 2] = [0.28, 0.68];
+/// Distances from the arm's foot that the level hand reaches \[m\]: nothing is drawn nearer or farther. Of 1500 plans over 40 x 40 cm
+/// 12 failed, all nearer than 0.291 m.
+pub const REACH_M: [f64; 2] = [0.295, 0.68];
 /// Draws before a spawn area counts as blocked.
 const MAX_DRAWS: usize = 1000;
 
@@ -157,6 +158,6 @@ mod tests {
         let message = refusal(Task::Stack, crowded);
         assert!(message.contains("x 0.47 m, y [0.0, 0.01] m") && message.contains("scene.base_xy_m"), "{message}");
         let message = refusal(Task::PickUp, SceneSettings { spawn_x_m: [1.2, 1.4], ..SceneSettings::default() });
-        assert!(message.contains("0.28 to 0.68 m") && !message.contains("goal") && !message.contains("base"), "{message}");
+        assert!(message.contains("0.295 to 0.68 m") && !message.contains("goal") && !message.contains("base"), "{message}");
     }
 }
