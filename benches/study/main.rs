@@ -4,12 +4,14 @@
 //! cargo bench --bench study -- few-demos     # BC, SC and HIL with 25, 50 and 100 demos: docs/results/few-demos.csv
 //! cargo bench --bench study -- off-track     # BC and HIL in scenes that their demos do not show, and with demos that do
 //! cargo bench --bench study -- paper         # preset paper, three tasks
+//! cargo bench --bench study -- gradients --recordings DIR --dynamics FILE   # the network's answer to an action beside the simulator's
 //! cargo bench --bench study -- figure        # docs/pictures/few-demos.svg from the CSV
 //! cargo bench --bench study -- table         # the CSV as a markdown table; --csv names another
 //! ```
 
 mod chain;
 mod few_demos;
+mod gradients;
 mod lab;
 mod off_track;
 mod paper;
@@ -66,6 +68,12 @@ pub struct Args {
     /// figure: the picture
     #[arg(long, value_name = "FILE", default_value = "docs/pictures/few-demos.svg")]
     picture: PathBuf,
+    /// gradients: recordings to look at
+    #[arg(long, value_name = "DIR")]
+    recordings: Option<PathBuf>,
+    /// gradients: the dynamics network that learned from them
+    #[arg(long, value_name = "FILE")]
+    dynamics: Option<PathBuf>,
     /// What cargo adds
     #[arg(long, hide = true)]
     bench: bool,
@@ -76,6 +84,7 @@ enum Study {
     FewDemos,
     OffTrack,
     Paper,
+    Gradients,
     Figure,
     Table,
 }
@@ -103,11 +112,12 @@ fn main() -> anyhow::Result<()> {
         Some(Study::FewDemos) => few_demos::run(&args),
         Some(Study::OffTrack) => off_track::run(&args),
         Some(Study::Paper) => paper::run(&args),
+        Some(Study::Gradients) => gradients::run(&args),
         Some(Study::Figure) => show::figure(&args),
         Some(Study::Table) => show::table(&args),
         // `cargo bench` runs every bench: hours of training are not started by accident.
         None => {
-            println!("study: name one: cargo bench --bench study -- few-demos|off-track|paper|figure|table");
+            println!("study: name one: cargo bench --bench study -- few-demos|off-track|paper|gradients|figure|table");
             Ok(())
         }
     }

@@ -20,17 +20,17 @@ impl Controller for Replay<'_> {
     }
 }
 
-/// Runs the commands of `demo` from its start under disturbances drawn from `rng`, for as many steps as the demo has. Friction, mass
-/// and obstacles are those of the settings: a dataset does not hold them.
-pub fn reexecute(index: u64, demo: &Demo, scene: &SceneSettings, settings: &SimulateSettings, rng: ChaCha8Rng) -> Episode {
+/// Runs the commands of `demo` from its start under disturbances drawn from `rng`, for as many steps as the demo has. Friction and mass are drawn anew and
+/// obstacles taken from the settings: a dataset does not hold them.
+pub fn reexecute(index: u64, demo: &Demo, scene: &SceneSettings, settings: &SimulateSettings, mut rng: ChaCha8Rng) -> Episode {
     let start = State::from_row(demo.task(), demo.state(0)).expect("a demo's rows have its task's length");
     let scene = Scene {
         task: demo.task(),
         block: start.block,
         context: start.context,
         obstacles: scene.obstacles.clone(),
-        friction: scene.friction,
-        block_mass_kg: scene.block_mass_kg,
+        friction: scene.friction.draw(&mut rng),
+        block_mass_kg: scene.block_mass_kg.draw(&mut rng),
     };
     let mut replay = Replay { commands: demo.actions().chunks_exact(JOINTS) };
     let steps = u32::try_from(demo.len()).unwrap_or(u32::MAX);
