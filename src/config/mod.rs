@@ -82,7 +82,7 @@ impl Stage {
             Stage::Simulate => &["simulate"],
             Stage::Convert => &["convert"],
             Stage::Pretrain => &["pretrain"],
-            Stage::Train => &["train"],
+            Stage::Train => &["scene", "simulate", "train"],
             Stage::Evaluate => &["scene", "plan", "simulate", "evaluate"],
         }
     }

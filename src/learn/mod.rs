@@ -1,9 +1,11 @@
 //! The paper's method: hybrid imitation learning and its parts, one file an algorithm.
 
 pub mod behavior_cloning;
+mod checkpoint;
 mod corpus;
 mod cost;
 mod dynamics;
+mod exact;
 mod features;
 mod fine_tuning;
 #[cfg(test)]
@@ -16,8 +18,12 @@ mod model_report;
 mod policy;
 pub mod pretrain_dynamics;
 mod regression;
+#[cfg(test)]
+mod resume_tests;
 mod rollout;
+mod run;
 mod scaling;
+mod selection;
 mod shards;
 pub mod state_cloning;
 #[cfg(test)]
@@ -26,6 +32,7 @@ mod testing;
 mod training_tests;
 mod weights;
 
+pub use checkpoint::Checkpoint;
 pub use dynamics::Dynamics;
 pub use features::Features;
 pub use hil::{Method, Trained, train};
@@ -34,3 +41,5 @@ pub use metrics::EpochMetrics;
 pub use model_report::ModelReport;
 pub use policy::Policy;
 pub use pretrain_dynamics::pretrain_dynamics;
+pub use run::Hooks;
+pub use selection::{Candidate, Selection};
