@@ -35,7 +35,9 @@ pub fn read(path: &Path, ours: &Provenance) -> Result<Option<Checkpoint>> {
         None => Ok(Some(Checkpoint { tensors, meta })),
         Some((key, theirs, ours)) => Err(Error::input(
             path,
-            format!("is the checkpoint of another run: {key} was {theirs}, now it is {ours}; go on with the old one, or give another --out; {anew}"),
+            format!(
+                "is the checkpoint of another run: {key} was {theirs}, now it is {ours}; go on with the old one, or give another --out; {anew}"
+            ),
         )),
     }
 }
@@ -100,7 +102,9 @@ impl<'a> Keeper<'a> {
             (Error::Interrupted, Some(after)) => Error::InterruptedAt(format!(
                 "the state after {after} is in {path}: run the same command with --resume to continue"
             )),
-            (Error::Failed(why), Some(after)) => Error::Failed(format!("{why}; the last good state, after {after}, is kept in {path}")),
+            (Error::Failed(why), Some(after)) => {
+                Error::Failed(format!("{why}; the last good state, after {after}, is kept in {path}"))
+            }
             (other, _) => other,
         }
     }

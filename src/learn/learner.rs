@@ -182,7 +182,7 @@ impl Learner {
         if value.is_finite() {
             return Ok(());
         }
-        Err(Error::Failed(format!("{term} is {value} at update {}: {remedy}", self.updates + 1)))
+        Err(Error::Failed(format!("{term} is {value} after {} updates of the stage: {remedy}", self.updates)))
     }
 
     /// Gradient of (1 - alpha) L_BC + alpha L_SC into `self.gradient`.
@@ -273,6 +273,20 @@ impl Learner {
         }
         (metrics.updates, metrics.skipped) = (self.updates, self.skipped);
         metrics
+    }
+
+    /// Whether the validation losses are numbers: an epoch may end just after its last update has gone wrong.
+    ///
+    /// # Errors
+    /// [`Error::Failed`] names the loss.
+    pub(super) fn finite_on_validation(&self, row: &EpochMetrics) -> Result<()> {
+        let remedy = "lower train.learning_rate or train.warm_start_learning_rate, or set train.clip_norm";
+        self.finite("L_BC (Eq. 3) on the validation demos", row.validation_l_bc, remedy)?;
+        if self.model.is_none() {
+            return Ok(());
+        }
+        let term = "the loss of the dynamics network (Eq. 6) on the validation demos";
+        self.finite(term, row.validation_l_model, "lower train.dynamics_learning_rate")
     }
 
     /// The results.

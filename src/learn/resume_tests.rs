@@ -132,14 +132,17 @@ fn failing(method: Method, settings: &TrainSettings) -> (String, Option<Checkpoi
 fn a_loss_that_is_no_number_names_its_term_and_leaves_the_last_good_state() {
     let diverging = TrainSettings { learning_rate: 1e30, clip_norm: 0.0, ..quick() };
     let (message, kept) = failing(Method::Hil, &diverging);
-    assert!(message.contains("L_BC (Eq. 3)") && message.contains("update") && message.contains("train.learning_rate"), "{message}");
+    assert!(
+        message.contains("L_BC (Eq. 3)") && message.contains("update") && message.contains("train.learning_rate"),
+        "{message}"
+    );
     let kept = kept.expect("the warm start was good");
     assert!(kept.after().starts_with("warm-start epoch "), "{}", kept.after());
     assert!(kept.tensors.iter().all(|t| t.data.iter().all(|v| v.is_finite())));
 
     let fine_tuning = TrainSettings { dynamics_learning_rate: 1e30, clip_norm: 0.0, ..quick() };
     let (message, kept) = failing(Method::Hil, &fine_tuning);
-    assert!(message.contains("Eq. ") && kept.is_some(), "{message}");
+    assert!(message.contains("Eq. 6") && message.contains("train.dynamics_learning_rate") && kept.is_some(), "{message}");
 
     let at_once = TrainSettings { warm_start_learning_rate: 1e30, bc_batch: 8, clip_norm: 0.0, ..quick() };
     let (message, kept) = failing(Method::Bc, &at_once);
@@ -147,10 +150,29 @@ fn a_loss_that_is_no_number_names_its_term_and_leaves_the_last_good_state() {
 }
 
 #[test]
+fn an_epoch_without_a_usable_gradient_ends_training() {
+    let (mut first, go) = (None, Interrupt::default());
+    let keep = Box::new(|checkpoint: &Checkpoint| {
+        first.get_or_insert_with(|| checkpoint.clone());
+    });
+    let settings = TrainSettings { clip_norm: 0.0, ..quick() };
+    run(Method::Bc, &settings, Hooks { keep, keep_every: Some(Duration::ZERO), ..Hooks::new(&go) }).expect("trains");
+    let mut steep = first.expect("kept");
+    // A head so large that the loss is still a number, its gradient in the layers below none that Adam could square.
+    for name in ["policy.net", "policy.net.average"] {
+        let net = steep.tensors.iter_mut().find(|t| t.name == name).expect("a network");
+        let head = net.data.len() - (16 + 1) * 9;
+        net.data[head..].iter_mut().for_each(|w| *w *= 1e16);
+    }
+    let message =
+        run(Method::Bc, &settings, Hooks { resume: Some(steep), ..Hooks::new(&go) }).expect_err("must fail").to_string();
+    assert!(message.contains("gradient of L_BC (Eq. 3)") && message.contains("warm-start epoch 2"), "{message}");
+}
+
+#[test]
 fn a_checkpoint_that_does_not_fit_is_refused() {
     let (mut kept, go) = (None, Interrupt::default());
-    let hooks =
-        Hooks { keep: Box::new(|c| kept = Some(c.clone())), keep_every: Some(Duration::ZERO), ..Hooks::new(&go) };
+    let hooks = Hooks { keep: Box::new(|c| kept = Some(c.clone())), keep_every: Some(Duration::ZERO), ..Hooks::new(&go) };
     run(Method::Bc, &quick(), hooks).expect("trains");
     let kept = kept.expect("kept");
     let refused = |method, settings: &TrainSettings, resume: Checkpoint| {

@@ -108,6 +108,7 @@ impl<'a> Run<'a> {
     /// [`Error::Failed`] when no update of the epoch could be made or a number is none any more; what rollouts return.
     pub fn end_epoch(&mut self, metrics: EpochMetrics, alpha_average: Option<f64>) -> Result<()> {
         let row = self.learner.validate(metrics);
+        self.learner.finite_on_validation(&row)?;
         self.refuse_standstill(&row)?;
         let state = self.learner.state(alpha_average);
         state.check(&row)?;

@@ -102,16 +102,7 @@ fn metrics_have_one_row_an_epoch() {
     let hooks = Hooks { log: Box::new(|m| logged.push(m.clone())), ..Hooks::new(&go) };
     let (train_demos, held_out) = (demos(Task::Stack, 8, 30, 0), demos(Task::Stack, 2, 30, 100));
     let dynamics = pretrain(Task::Stack, 1).0;
-    let trained = train(
-        Method::Hil,
-        &train_demos,
-        &held_out,
-        Some(dynamics),
-        &quick(),
-        7,
-        hooks,
-    )
-    .expect("trains");
+    let trained = train(Method::Hil, &train_demos, &held_out, Some(dynamics), &quick(), 7, hooks).expect("trains");
     assert_eq!(trained.metrics.rows(), logged.len());
     let last = logged.last().expect("epochs");
     assert_eq!((last.stage, last.epoch, last.epochs, last.updates), ("hil", 4, 4, 8));
