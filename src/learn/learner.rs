@@ -174,7 +174,11 @@ impl Learner {
             noise: &self.sc_noise,
         };
         let l_sc = sc::state_cloning(&self.policy, &model.dynamics, batch, &self.segments, choices, &mut self.sc_work);
-        self.finite("L_SC (Eq. 5)", l_sc, "raise train.rho, set train.clip_norm or lower train.learning_rate")?;
+        self.finite(
+            "L_SC (Eq. 5)",
+            l_sc,
+            "raise train.rho, set train.clip_norm, or lower train.learning_rate or train.dynamics_learning_rate",
+        )?;
         Ok(l_sc)
     }
 
@@ -273,20 +277,6 @@ impl Learner {
         }
         (metrics.updates, metrics.skipped) = (self.updates, self.skipped);
         metrics
-    }
-
-    /// Whether the validation losses are numbers: an epoch may end just after its last update has gone wrong.
-    ///
-    /// # Errors
-    /// [`Error::Failed`] names the loss.
-    pub(super) fn finite_on_validation(&self, row: &EpochMetrics) -> Result<()> {
-        let remedy = "lower train.learning_rate or train.warm_start_learning_rate, or set train.clip_norm";
-        self.finite("L_BC (Eq. 3) on the validation demos", row.validation_l_bc, remedy)?;
-        if self.model.is_none() {
-            return Ok(());
-        }
-        let term = "the loss of the dynamics network (Eq. 6) on the validation demos";
-        self.finite(term, row.validation_l_model, "lower train.dynamics_learning_rate")
     }
 
     /// The results.

@@ -41,5 +41,5 @@ pub use metrics::EpochMetrics;
 pub use model_report::ModelReport;
 pub use policy::Policy;
 pub use pretrain_dynamics::pretrain_dynamics;
-pub use run::Hooks;
+pub use run::{Hooks, Score};
 pub use selection::{Candidate, Selection};

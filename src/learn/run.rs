@@ -11,12 +11,15 @@ use crate::error::{Error, Result};
 use crate::interrupt::Interrupt;
 use std::time::{Duration, Instant};
 
+/// Counts the successes of a policy.
+pub type Score<'a> = Box<dyn FnMut(&Policy) -> Result<u64> + 'a>;
+
 /// What training asks of the world around it.
 pub struct Hooks<'a> {
     /// Called after every epoch.
     pub log: Box<dyn FnMut(&EpochMetrics) + 'a>,
     /// Rolls a policy out on `train.select_episodes` episodes and counts the successes; called only when that is above 0.
-    pub score: Box<dyn FnMut(&Policy) -> Result<u64> + 'a>,
+    pub score: Score<'a>,
     /// Takes a checkpoint: when the time has come, and the last good one when training ends early.
     pub keep: Box<dyn FnMut(&Checkpoint) + 'a>,
     /// Time between two checkpoints; `None` = only when training ends early.
@@ -108,7 +111,7 @@ impl<'a> Run<'a> {
     /// [`Error::Failed`] when no update of the epoch could be made or a number is none any more; what rollouts return.
     pub fn end_epoch(&mut self, metrics: EpochMetrics, alpha_average: Option<f64>) -> Result<()> {
         let row = self.learner.validate(metrics);
-        self.learner.finite_on_validation(&row)?;
+        self.check_validation(&row)?;
         self.refuse_standstill(&row)?;
         let state = self.learner.state(alpha_average);
         state.check(&row)?;
@@ -120,6 +123,23 @@ impl<'a> Run<'a> {
             self.keep();
         }
         Ok(())
+    }
+
+    /// An epoch may end just after its last update has gone wrong; the losses on the validation demos show it.
+    fn check_validation(&self, row: &EpochMetrics) -> Result<()> {
+        let policy = "lower train.learning_rate or train.warm_start_learning_rate, or set train.clip_norm";
+        let l_bc = ("L_BC (Eq. 3)", row.validation_l_bc, policy);
+        let model = ("the loss of the dynamics network (Eq. 6)", row.validation_l_model, "lower train.dynamics_learning_rate");
+        let known = [Some(l_bc), self.learner.model.is_some().then_some(model)];
+        match known.into_iter().flatten().find(|(_, value, _)| !value.is_finite()) {
+            Some((term, value, remedy)) => {
+                let (place, updates) = (row.place(), row.updates);
+                Err(Error::Failed(format!(
+                    "{term} on the validation demos is {value} after {place} (update {updates}): {remedy}"
+                )))
+            }
+            None => Ok(()),
+        }
     }
 
     /// An epoch in which every update was left out teaches nothing, nor will the next.
