@@ -10,6 +10,8 @@ PRESET ?= best
 PIPELINE ?= $(if $(filter paper,$(PRESET)),pipelines/paper/$(TASK).toml,pipelines/$(TASK).toml)
 # hil: hybrid imitation learning; bc: behavior cloning; sc: state cloning.
 METHOD ?= hil
+# 1: an interrupted training goes on from its checkpoint.
+RESUME ?=
 # Overrides, separated by blanks: SET="plan.speed=0.5 train.rho=0.3".
 SET    ?=
 
@@ -58,7 +60,7 @@ $(DIR)/dynamics.safetensors: $(DIR)/dataset $(DIR)/settings/pretrain.toml | $(HI
 	$(HILT) pretrain $(FLAGS) $(call RUN,pretrain) --dataset $< --out $@
 
 $(DIR)/policy.safetensors: $(DIR)/dynamics.safetensors $(DIR)/settings/train.toml | $(HILT)
-	$(HILT) train $(FLAGS) $(call RUN,train) --method $(METHOD) --dataset $(DIR)/dataset --dynamics $< --out $@
+	$(HILT) train $(FLAGS) $(call RUN,train) --method $(METHOD) --dataset $(DIR)/dataset --dynamics $< --out $@ $(if $(filter-out 0,$(RESUME)),--resume)
 
 $(DIR)/evaluation.json: $(DIR)/policy.safetensors $(DIR)/settings/evaluate.toml | $(HILT)
 	$(HILT) evaluate $(FLAGS) $(call RUN,evaluate) --policy $< --out $@
@@ -114,6 +116,6 @@ clean-runs: ## remove what was made for TASK under RUNS
 
 help: ## this list
 	@echo "make TARGET [TASK=pick-up|pick-and-place|stack] [RUNS=DIR] [SEED=N] [THREADS=N] [PRESET=best|paper] [PIPELINE=FILE]"
-	@echo "            [METHOD=hil|bc|sc] [SET=\"stage.key=value ...\"]"
+	@echo "            [METHOD=hil|bc|sc] [RESUME=1] [SET=\"stage.key=value ...\"]"
 	@grep -hE '^[a-z-]+:.*## ' $(firstword $(MAKEFILE_LIST)) | sed -E 's/^([a-z-]+):.*## (.*)$$/  \1|\2/' | column -t -s '|'
 	@echo "Results are not rebuilt when only the source code changes: make clean-runs first."

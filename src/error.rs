@@ -32,6 +32,9 @@ pub enum Error {
     /// Ctrl-C or a termination signal: nothing half-written is left; exit code 130.
     #[error("interrupted; no artefact was changed, run the same command to start again")]
     Interrupted,
+    /// The same in a stage that keeps its state: the words say where it is and how to go on; exit code 130.
+    #[error("interrupted; no artefact was changed, {0}")]
+    InterruptedAt(String),
 }
 
 /// Result of the library.
@@ -52,7 +55,7 @@ impl Error {
     pub fn exit_code(&self) -> u8 {
         match self {
             Error::Usage(_) => 2,
-            Error::Interrupted => 130,
+            Error::Interrupted | Error::InterruptedAt(_) => 130,
             _ => 1,
         }
     }

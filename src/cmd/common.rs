@@ -46,9 +46,10 @@ impl SettingsArgs {
                 return Err(Error::Usage(format!("which task? give --task ({tasks}) or --pipeline FILE")));
             }
         };
-        let mut sets = self.set.clone();
-        sets.extend(flags.iter().filter_map(|(key, value)| value.as_ref().map(|value| format!("{key}={value}"))));
-        Pipeline::load(&source, &sets)
+        let given: Vec<(String, String)> =
+            flags.iter().filter_map(|(key, value)| value.as_ref().map(|v| (format!("{key}={v}"), flag_text(key, v)))).collect();
+        let sets: Vec<String> = self.set.iter().chain(given.iter().map(|(set, _)| set)).cloned().collect();
+        Pipeline::load(&source, &sets).map_err(|e| in_words_of_flags(e, &given))
     }
 
     /// What made an artefact of `stage`: the settings it reads, the seed, the hashes of its inputs by role ("plans", "dataset").
@@ -59,6 +60,18 @@ impl SettingsArgs {
         let provenance = Provenance::new(stage.name(), pipeline.task, pipeline.to_json(stage)?, self.seed);
         inputs.iter().try_fold(provenance, |provenance, (role, path)| provenance.with_input(role, path))
     }
+}
+
+/// `train.rho` and 2 as they were typed: `--rho 2`.
+fn flag_text(key: &str, value: &str) -> String {
+    format!("--{} {value}", key.rsplit('.').next().unwrap_or(key))
+}
+
+/// A refusal of a flag names the flag, not the setting that it stands for.
+fn in_words_of_flags(error: Error, given: &[(String, String)]) -> Error {
+    let Error::Usage(message) = error else { return error };
+    let flag = given.iter().find_map(|(set, flag)| Some((flag, message.strip_prefix(&format!("--set {set}"))?)));
+    Error::Usage(flag.map_or_else(|| message.clone(), |(flag, rest)| format!("{flag}{rest}")))
 }
 
 /// The given path, or `name` under `runs/<task>/`.

@@ -21,14 +21,14 @@ pub struct Console {
 }
 
 impl Console {
-    /// `quiet` keeps stderr for errors; `log` is created or emptied, with the directories above it.
+    /// `quiet` keeps stderr for errors; `log` is created, with the directories above it; an old one is emptied, or `goes_on`.
     ///
     /// # Errors
     /// [`Error::Io`] when the log cannot be created.
-    pub fn new(quiet: bool, log: Option<&Path>) -> Result<Self> {
+    pub fn new(quiet: bool, log: Option<&Path>, goes_on: bool) -> Result<Self> {
         let show_bars = !quiet && stderr().is_terminal();
         let target = if show_bars { ProgressDrawTarget::stderr() } else { ProgressDrawTarget::hidden() };
-        let log = log.map(create).transpose()?.map(Mutex::new);
+        let log = log.map(|path| open(path, goes_on)).transpose()?.map(Mutex::new);
         Ok(Console { quiet, log, bars: MultiProgress::with_draw_target(target) })
     }
 
@@ -55,16 +55,16 @@ impl Console {
                 .expect("the template of the bar is well formed");
             self.bars.add(ProgressBar::new(total).with_style(style).with_prefix(stage).with_message(unit))
         });
-        Progress { console: self, stage, unit, total, bar, done: AtomicU64::new(0), started: Instant::now() }
+        Progress { console: self, stage, unit, total, bar, before: 0, done: AtomicU64::new(0), started: Instant::now() }
     }
 }
 
-fn create(path: &Path) -> Result<File> {
+fn open(path: &Path, goes_on: bool) -> Result<File> {
     let io = |e| Error::io(path, "create", e);
     if let Some(parent) = path.parent() {
         std::fs::create_dir_all(parent).map_err(io)?;
     }
-    File::create(path).map_err(io)
+    File::options().create(true).write(true).append(goes_on).truncate(!goes_on).open(path).map_err(io)
 }
 
 /// Counts items of work, from any thread.
@@ -75,6 +75,8 @@ pub struct Progress<'a> {
     unit: &'static str,
     total: u64,
     bar: Option<ProgressBar>,
+    /// Items that an earlier process has done.
+    before: u64,
     done: AtomicU64,
     started: Instant,
 }
@@ -83,6 +85,15 @@ impl Progress<'_> {
     /// The work began earlier, at `started`.
     pub fn since(mut self, started: Instant) -> Self {
         self.started = started;
+        self
+    }
+
+    /// An earlier process has done so many of the items.
+    pub fn after(mut self, items: u64) -> Self {
+        if let Some(bar) = &self.bar {
+            bar.set_position(items);
+        }
+        (self.before, self.done) = (items, AtomicU64::new(items));
         self
     }
 
@@ -108,7 +119,7 @@ impl Progress<'_> {
             bar.finish_and_clear();
         }
         let seconds = self.started.elapsed().as_secs_f64();
-        let done = self.done.load(Ordering::Relaxed);
+        let done = self.done.load(Ordering::Relaxed) - self.before;
         let rate = done as f64 / seconds.max(f64::MIN_POSITIVE);
         self.console.say(&format!("{}: {done} {} in {seconds:.1} s ({rate:.1} per second){more}", self.stage, self.unit));
     }

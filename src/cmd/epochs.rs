@@ -22,7 +22,8 @@ impl<'a> Epochs<'a> {
     pub fn step(&mut self, epoch: &EpochMetrics) {
         if self.running.as_ref().is_none_or(|(part, _)| *part != epoch.stage) {
             self.finish();
-            self.running = Some((epoch.stage, self.console.progress(epoch.stage, epoch.epochs, "epochs").since(self.began)));
+            let progress = self.console.progress(epoch.stage, epoch.epochs, "epochs").since(self.began);
+            self.running = Some((epoch.stage, progress.after(epoch.epoch - 1)));
         }
         if let Some((_, progress)) = &self.running {
             progress.step_with(&words(epoch));

@@ -69,7 +69,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome> {
     if let Some(out) = &args.out {
         [out, &out.with_extension("parquet")].into_iter().try_for_each(|path| atomic::check_place(path))?;
     }
-    let rollouts = Rollouts { pipeline: &pipeline, seed: args.settings.seed, horizon_steps };
+    let rollouts = Rollouts::evaluation(&pipeline, args.settings.seed, horizon_steps);
     let trials = match &args.record {
         None => run_all(&rollouts, &subject, context, |_| Ok(()))?,
         Some(dir) => record_all(dir, &rollouts, &subject, context, &provenance)?,
@@ -126,7 +126,7 @@ fn run_all<K>(rollouts: &Rollouts, subject: &Subject, context: &Context, keep: K
 where
     K: Fn(&Episode) -> Result<()> + Sync,
 {
-    let progress = context.console.progress("evaluate", rollouts.pipeline.evaluate.episodes, "episodes");
+    let progress = context.console.progress("evaluate", rollouts.episodes, "episodes");
     let make = |index, scene: &Scene| Ok(subject.controller(rollouts, index, scene));
     let trials = rollouts.run(make, &context.interrupt, |episode| {
         progress.step();

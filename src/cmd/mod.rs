@@ -1,5 +1,6 @@
 //! The command line: one stage, one file, `Args` (its doc comment is its help) and `run`; no logic of its own.
 
+mod checkpoint;
 mod common;
 mod console;
 mod convert;
@@ -96,7 +97,8 @@ impl Cli {
             .num_threads(threads)
             .build_global()
             .map_err(|e| Error::Failed(format!("cannot start worker threads: {e}; try --threads 1")))?;
-        let context = Context { console: Console::new(self.quiet, self.log.as_deref())?, interrupt };
+        let goes_on = matches!(&self.command, Command::Train(args) if args.resume);
+        let context = Context { console: Console::new(self.quiet, self.log.as_deref(), goes_on)?, interrupt };
         let started = Instant::now();
         let outcome = match &self.command {
             Command::Plan(args) => plan::run(args, &context),

@@ -6,7 +6,6 @@ use crate::data::{atomic, dataset, table_file, weights};
 use crate::demo::Demo;
 use crate::error::{Error, Result};
 use crate::learn::{EpochMetrics, pretrain_dynamics};
-use crate::tasks::Task;
 use crate::{seed, sim};
 use rayon::prelude::*;
 use std::path::{Path, PathBuf};
@@ -31,7 +30,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome> {
     let pipeline = args.settings.resolve(&[])?;
     let dir = path_or(args.dataset.as_deref(), pipeline.task, "dataset");
     let out = path_or(args.out.as_deref(), pipeline.task, "dynamics.safetensors");
-    let (mut train, validation) = demos(&dir, pipeline.task)?;
+    let (mut train, validation) = demos(&dir, &pipeline)?;
     let provenance = args.settings.provenance(Stage::Pretrain, &pipeline, &[("dataset", &dir)])?;
     let (errors, metrics) = (out.with_extension("parquet"), out.with_file_name("pretraining.parquet"));
     [&errors, &metrics, &out].into_iter().try_for_each(|path| atomic::check_place(path))?;
@@ -72,10 +71,23 @@ fn reexecute(demos: &[Demo], pipeline: &Pipeline, seed: u64, context: &Context) 
     Ok(again)
 }
 
-/// Training and validation demos; no validation root means no validation demo.
-pub fn demos(dir: &Path, task: Task) -> Result<(Vec<Demo>, Vec<Demo>)> {
-    let train = dataset::read_for(&dir.join(dataset::TRAIN), task)?.demos;
+/// Training and validation demos.
+///
+/// # Errors
+/// What reading returns; [`Error::Input`] when there is no validation demo: a dataset of one episode has none.
+pub fn demos(dir: &Path, pipeline: &Pipeline) -> Result<(Vec<Demo>, Vec<Demo>)> {
+    let train = dataset::read_for(&dir.join(dataset::TRAIN), pipeline.task)?.demos;
     let root = dir.join(dataset::VALIDATION);
-    let validation = if root.exists() { dataset::read_for(&root, task)?.demos } else { Vec::new() };
+    let validation = if root.exists() { dataset::read_for(&root, pipeline.task)?.demos } else { Vec::new() };
+    if validation.is_empty() {
+        let (count, ratio) = (train.len(), pipeline.convert.train_per_validation);
+        return Err(Error::input(
+            dir,
+            format!(
+                "training demos: {count}, validation demos: none; `hilt convert` splits {ratio}:1 by episode and needs at least 2 \
+                 that succeeded; raise plan.episodes and run plan, simulate and convert again"
+            ),
+        ));
+    }
     Ok((train, validation))
 }

@@ -1,12 +1,20 @@
+use super::checkpoint::{self, Keeper};
 use super::common::{SettingsArgs, path_or, same_task};
 use super::epochs::Epochs;
-use super::{Context, Outcome, pretrain};
-use crate::config::Stage;
+use super::{Console, Context, Outcome, pretrain};
+use crate::config::{Pipeline, Stage};
 use crate::data::{atomic, table_file, weights};
 use crate::error::{Error, Result};
-use crate::learn::{Dynamics, EpochMetrics, Method, train};
+use crate::eval::{PolicyController, Rollouts};
+use crate::interrupt::Interrupt;
+use crate::learn::{Checkpoint, Dynamics, Hooks, Method, Policy, Selection, train};
+use crate::scene::Scene;
+use crate::sim::Controller;
 use crate::tasks::Task;
+use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::time::Duration;
 
 /// Kind of the weights that this stage writes.
 pub const KIND: &str = "policy";
@@ -37,6 +45,12 @@ pub struct Args {
     /// Metrics per epoch to write [default: training.parquet beside the weights]
     #[arg(long, value_name = "FILE.parquet")]
     metrics: Option<PathBuf>,
+    /// Continue an interrupted run of the same settings from its checkpoint, <OUT>.checkpoint.safetensors; the log goes on too
+    #[arg(long)]
+    pub resume: bool,
+    /// Time between two checkpoints; 0 = only when training is interrupted
+    #[arg(long, value_name = "SECONDS", default_value_t = 60)]
+    checkpoint_every: u64,
 }
 
 pub fn run(args: &Args, context: &Context) -> Result<Outcome> {
@@ -46,25 +60,71 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome> {
     let model = path_or(args.dynamics.as_deref(), pipeline.task, "dynamics.safetensors");
     let out = path_or(args.out.as_deref(), pipeline.task, "policy.safetensors");
     let metrics = args.metrics.clone().unwrap_or_else(|| out.with_file_name("training.parquet"));
-    let (demos, validation) = pretrain::demos(&dir, pipeline.task)?;
+    let (demos, validation) = pretrain::demos(&dir, &pipeline)?;
     let needs_model = args.method != Method::Bc || args.dynamics.is_some();
     let dynamics = needs_model.then(|| read_dynamics(&model, pipeline.task)).transpose()?;
     let all = [("dataset", dir.as_path()), ("dynamics", model.as_path())];
     let inputs = if needs_model { &all[..] } else { &all[..1] };
     let mut provenance = args.settings.provenance(Stage::Train, &pipeline, inputs)?;
-    [&metrics, &out].into_iter().try_for_each(|path| atomic::check_place(path))?;
+    let kept = checkpoint::place(&out);
+    [&metrics, &out, &kept].into_iter().try_for_each(|path| atomic::check_place(path))?;
     provenance.settings["method"] = format!("{:?}", args.method).to_lowercase().into();
 
-    let mut epochs = Epochs::new(&context.console);
-    let seed = args.settings.seed;
-    let mut log = |epoch: &EpochMetrics| epochs.step(epoch);
-    let trained = train(args.method, &demos, &validation, dynamics, &pipeline.train, seed, &mut log, &context.interrupt)?;
+    let (console, seed) = (&context.console, args.settings.seed);
+    let resume = if args.resume { checkpoint::read(&kept, &provenance)? } else { None };
+    announce(console, args.resume, resume.as_ref(), &kept);
+    let mut keeper = Keeper::new(&kept, &provenance, console, resume.as_ref());
+    let mut epochs = Epochs::new(console);
+    let hooks = Hooks {
+        log: Box::new(|epoch| epochs.step(epoch)),
+        score: Box::new(|policy| successes(&pipeline, seed, policy, &context.interrupt)),
+        keep: Box::new(|checkpoint| keeper.keep(checkpoint)),
+        keep_every: (args.checkpoint_every > 0).then(|| Duration::from_secs(args.checkpoint_every)),
+        resume,
+        interrupt: &context.interrupt,
+    };
+    let trained = train(args.method, &demos, &validation, dynamics, &pipeline.train, seed, hooks);
+    let trained = trained.map_err(|why| keeper.explain(why))?;
     epochs.finish();
-    let weights = weights::encode(&out, KIND, &trained.policy.to_tensors(), &trained.policy.meta(), &provenance)?;
+    let mut meta = trained.policy.meta();
+    if let Some(selection) = &trained.selection {
+        meta["selection"] = stated(selection, pipeline.train.select_episodes, seed);
+    }
+    let weights = weights::encode(&out, KIND, &trained.policy.to_tensors(), &meta, &provenance)?;
     let table = table_file::encode(&metrics, &trained.metrics, &provenance)?;
     atomic::write_all(&[(metrics, table), (out.clone(), weights)])?;
-    context.console.say(&format!("train: wrote {}", out.display()));
+    keeper.remove()?;
+    console.say(&format!("train: wrote {}", out.display()));
     Ok(Outcome::Done)
+}
+
+/// Says where training starts.
+fn announce(console: &Console, resume: bool, checkpoint: Option<&Checkpoint>, path: &Path) {
+    let path_shown = path.display();
+    match checkpoint {
+        Some(checkpoint) => console.say(&format!("train: continues after {}, from {path_shown}", checkpoint.after())),
+        None if resume => console.say(&format!("train: there is no {path_shown} to continue from; starts from the beginning")),
+        None if path.exists() => {
+            console.say(&format!("train: starts from the beginning; {path_shown} of an interrupted run will be replaced"));
+        }
+        None => {}
+    }
+}
+
+/// Episodes of the selection that a policy solves.
+fn successes(pipeline: &Pipeline, seed: u64, policy: &Policy, interrupt: &Interrupt) -> Result<u64> {
+    let policy = Arc::new(policy.clone());
+    let controller = |_, _: &Scene| {
+        let controller: Box<dyn Controller> = Box::new(PolicyController::new(Arc::clone(&policy), None));
+        Ok(Some(controller))
+    };
+    let trials = Rollouts::selection(pipeline, seed, policy.horizon_steps()).run(controller, interrupt, |_| Ok(()))?;
+    Ok(trials.iter().filter(|trial| trial.success).count() as u64)
+}
+
+/// The selection as the description of the weights has it.
+fn stated(selection: &Selection, episodes: u64, seed: u64) -> Value {
+    json!({ "episodes": episodes, "seed": seed, "candidates": selection.candidates, "chosen": selection.best() })
 }
 
 fn read_dynamics(path: &Path, task: Task) -> Result<Dynamics> {

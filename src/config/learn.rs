@@ -151,6 +151,11 @@ pub struct TrainSettings {
     pub clip_norm: f64,
     /// Decay of the average of the weights that is validated and kept; 0 = the last weights.
     pub ema_decay: f64,
+    /// Episodes that choose among the policies along the way, none of which an evaluation uses; 0 = keep the last policy.
+    pub select_episodes: u64,
+    /// Epochs of Algorithm 1 between two candidates. The warm start offers as many as Algorithm 1 does, evenly spaced; the policies
+    /// at the end of both are always among them.
+    pub select_every: u64,
 }
 
 impl Default for TrainSettings {
@@ -190,6 +195,8 @@ impl Default for TrainSettings {
             final_learning_rate: 1e-5,
             clip_norm: 1.0,
             ema_decay: 0.999,
+            select_episodes: 0,
+            select_every: 10,
         }
     }
 }
@@ -224,6 +231,10 @@ impl TrainSettings {
         }
         at_least_one("train.batch", self.batch as u64)?;
         at_least_one("train.bc_batch", self.bc_batch as u64)?;
+        at_least_one("train.select_every", self.select_every)?;
+        if self.select_episodes > MOST_EPISODES {
+            return refuse("train.select_episodes", self.select_episodes, &format!("from 0 to {MOST_EPISODES}"));
+        }
         if self.epochs == 0 && self.warm_start_updates == 0 {
             return Err(Error::Usage("train.epochs and train.warm_start_updates are both 0: there is nothing to do".into()));
         }
@@ -262,6 +273,8 @@ fn pulses(key: &str, pulses: &PulseSettings) -> Result<()> {
 /// Beyond these a network is a typing error.
 const MAX_LAYERS: usize = 16;
 const MAX_UNITS: usize = 4096;
+/// As many as an evaluation may have.
+const MOST_EPISODES: u64 = 100_000;
 
 fn network(stage: &str, layers: usize, units: usize) -> Result<()> {
     if !(1..=MAX_LAYERS).contains(&layers) {

@@ -82,7 +82,7 @@ impl Stage {
             Stage::Simulate => &["simulate"],
             Stage::Convert => &["convert"],
             Stage::Pretrain => &["scene", "simulate", "pretrain"],
-            Stage::Train => &["train"],
+            Stage::Train => &["scene", "simulate", "train"],
             Stage::Evaluate => &["scene", "plan", "simulate", "evaluate"],
         }
     }

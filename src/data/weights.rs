@@ -11,6 +11,9 @@ use serde_json::Value;
 use std::collections::HashMap;
 use std::path::Path;
 
+/// The kind of a checkpoint of training; every other kind is a network's.
+pub const CHECKPOINT: &str = "checkpoint";
+
 /// Bytes of a number.
 const F32_BYTES: usize = size_of::<f32>();
 
@@ -24,7 +27,7 @@ struct Header {
     seal: String,
 }
 
-/// Writes weights of a `kind` ("policy" or "dynamics") with `meta`, all that is needed to run them.
+/// Writes weights of a `kind` ("policy", "dynamics" or [`CHECKPOINT`]) with `meta`, all that is needed to run them.
 ///
 /// # Errors
 /// As [`encode`]; [`Error::Io`] when the system refuses.
@@ -73,9 +76,13 @@ pub fn encode(path: &Path, kind: &str, tensors: &[NamedTensor], meta: &Value, pr
 pub fn read(path: &Path, kind: &str) -> Result<(Vec<NamedTensor>, Value, Provenance)> {
     let (found, tensors, meta, provenance) = read_any(path)?;
     if found != kind {
-        return Err(Error::input(path, format!("holds the weights of a {found} network, a {kind} network is needed")));
+        return Err(Error::input(path, format!("holds the weights of a {}, a {} is needed", named(&found), named(kind))));
     }
     Ok((tensors, meta, provenance))
+}
+
+fn named(kind: &str) -> String {
+    if kind == CHECKPOINT { "checkpoint of training".into() } else { format!("{kind} network") }
 }
 
 /// As [`read`], of any kind; the kind comes first.

@@ -1,7 +1,8 @@
 //! Seeded rollouts of a controller: success with its interval, conditions by name, failure classes.
 //!
-//! Scenes come from the random stream `evaluate.scene`, noise from `evaluate.noise`. Demonstrations are drawn from `plan.scene` and
-//! `simulate.noise`: the stage's name is part of a stream, so that no evaluation episode repeats a demonstration, whatever the seeds.
+//! Scenes come from the random stream `evaluate.scene`, noise from `evaluate.noise`; the rollouts that select a model have
+//! `select.scene` and `select.noise`. Demonstrations are drawn from `plan.scene` and `simulate.noise`: the purpose is part of a
+//! stream's name, so that no evaluation episode repeats a demonstration or had a say in the selection, whatever the seeds.
 
 mod log;
 mod policy;
@@ -13,7 +14,7 @@ pub use policy::PolicyController;
 pub use summary::{Percentiles, Summary};
 pub use wilson::wilson_95;
 
-use crate::config::{Pipeline, PulseSettings, SimulateSettings};
+use crate::config::{EvaluateSettings, Pipeline, PulseSettings, SimulateSettings};
 use crate::demo::Episode;
 use crate::error::Result;
 use crate::interrupt::Interrupt;
@@ -21,6 +22,7 @@ use crate::scene::Scene;
 use crate::seed;
 use crate::sim::{Controller, Disturbance, run_episode};
 use crate::tasks::{FailureClass, draw_scene};
+use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 
 /// How one evaluation episode went.
@@ -60,24 +62,45 @@ impl Trial {
     }
 }
 
-/// What to evaluate on.
+/// What to roll out on.
 #[derive(Clone, Copy, Debug)]
 pub struct Rollouts<'a> {
-    /// Scene, noise and number of episodes.
+    /// Scene and noise.
     pub pipeline: &'a Pipeline,
     /// The run's seed.
     pub seed: u64,
+    /// What for: the first part of the random streams' names.
+    purpose: &'static str,
+    /// How many.
+    pub episodes: u64,
+    /// Whether the pulses of the demonstrations are among the noise.
+    pulses: bool,
     /// Control steps before an episode is given up.
     pub horizon_steps: u32,
 }
 
-impl Rollouts<'_> {
+impl<'a> Rollouts<'a> {
+    /// An evaluation, as `[evaluate]` has it.
+    pub fn evaluation(pipeline: &'a Pipeline, seed: u64, horizon_steps: u32) -> Self {
+        let EvaluateSettings { episodes, pulses, .. } = pipeline.evaluate;
+        Rollouts { pipeline, seed, purpose: "evaluate", episodes, pulses, horizon_steps }
+    }
+
+    /// The choice among policies during training, as `[train]` has it; without pulses.
+    pub fn selection(pipeline: &'a Pipeline, seed: u64, horizon_steps: u32) -> Self {
+        Rollouts { pipeline, seed, purpose: "select", episodes: pipeline.train.select_episodes, pulses: false, horizon_steps }
+    }
+
+    fn stream(&self, of: &str, index: u64) -> ChaCha8Rng {
+        seed::stream(self.seed, &format!("{}.{of}", self.purpose), index)
+    }
+
     /// The scene of episode `index`.
     ///
     /// # Errors
     /// See [`draw_scene`].
     pub fn scene(&self, index: u64) -> Result<Scene> {
-        draw_scene(self.pipeline.task, &self.pipeline.scene, &mut seed::stream(self.seed, "evaluate.scene", index))
+        draw_scene(self.pipeline.task, &self.pipeline.scene, &mut self.stream("scene", index))
     }
 
     /// Runs all episodes, in parallel on the current thread pool; the result does not depend on the number of threads.
@@ -97,13 +120,13 @@ impl Rollouts<'_> {
         F: Fn(u64, &Scene) -> Result<Option<Box<dyn Controller>>> + Sync,
     {
         let settings = self.disturbances();
-        (0..self.pipeline.evaluate.episodes)
+        (0..self.episodes)
             .into_par_iter()
             .map(|index| {
                 interrupt.check()?;
                 let scene = self.scene(index)?;
                 let episode = make_controller(index, &scene)?.map(|mut controller| {
-                    let mut disturbance = Disturbance::new(&settings, seed::stream(self.seed, "evaluate.noise", index));
+                    let mut disturbance = Disturbance::new(&settings, self.stream("noise", index));
                     run_episode(index, &scene, controller.as_mut(), &mut disturbance, self.horizon_steps)
                 });
                 done(episode.as_ref())?;
@@ -112,10 +135,10 @@ impl Rollouts<'_> {
             .collect()
     }
 
-    /// The noise of the demonstrations, without their pulses unless `evaluate.pulses` asks for them.
+    /// The noise of the demonstrations, with or without their pulses.
     fn disturbances(&self) -> SimulateSettings {
         let mut settings = self.pipeline.simulate.clone();
-        if !self.pipeline.evaluate.pulses {
+        if !self.pulses {
             settings.pulses = PulseSettings { probability: 0.0, ..settings.pulses };
         }
         settings
@@ -126,4 +149,23 @@ fn unplanned(index: u64, scene: Scene) -> Trial {
     let conditions = vec![false; scene.task.condition_names().len()];
     let failure = Some(FailureClass::NeverReached);
     Trial { index, scene, success: false, failure, steps: 0, reward: 0.0, conditions, hit_obstacle: false }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::tasks::Task;
+
+    #[test]
+    fn selection_and_evaluation_share_no_episode() {
+        let mut pipeline = Pipeline::defaults(Task::Stack);
+        pipeline.train.select_episodes = 20;
+        let (select, evaluate) = (Rollouts::selection(&pipeline, 3, 10), Rollouts::evaluation(&pipeline, 3, 10));
+        assert_eq!((select.episodes, evaluate.episodes), (20, pipeline.evaluate.episodes));
+        let scenes = |of: &Rollouts| (0..20).map(|i| of.scene(i).expect("a scene").block.position_m).collect::<Vec<_>>();
+        let (selecting, evaluating) = (scenes(&select), scenes(&evaluate));
+        assert!(selecting.iter().all(|scene| !evaluating.contains(scene)));
+        let noise = |of: &Rollouts| of.stream("noise", 0).get_stream();
+        assert_ne!(noise(&select), noise(&evaluate));
+    }
 }

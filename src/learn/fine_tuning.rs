@@ -13,7 +13,7 @@ pub struct Model {
     /// Its inputs and targets on the training demos.
     pub samples: Samples,
     held_out: Samples,
-    adam: Adam,
+    pub(super) adam: Adam,
     work: Regression,
 }
 
@@ -29,14 +29,14 @@ impl Model {
         }
     }
 
-    /// One update on transitions `rows` of the training demos; returns the loss before it.
-    pub fn fine_tune(&mut self, rows: &[usize], mean_length: f32, learning_rate: f64) -> f64 {
+    /// One update on transitions `rows` of the training demos; returns the loss before it and the norm of its gradient.
+    pub fn fine_tune(&mut self, rows: &[usize], mean_length: f32, learning_rate: f64) -> (f64, f64) {
         let Model { dynamics, samples, adam, work, .. } = self;
         let loss = model_loss(dynamics, rows.len(), mean_length);
         let l_model = work.loss(&dynamics.net, samples, rows, &loss, true);
-        clip_by_global_norm(&mut work.gradient, dynamics.settings().clip_norm);
+        let norm = clip_by_global_norm(&mut work.gradient, dynamics.settings().clip_norm);
         adam.step(&mut dynamics.net.params_mut(), &work.gradient, learning_rate);
-        l_model
+        (l_model, norm)
     }
 
     /// Loss on the validation demos.

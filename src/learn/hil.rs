@@ -2,13 +2,14 @@
 //! another alpha.
 
 use super::learner::Learner;
-use super::metrics::{EpochMetrics, Mean, table};
+use super::metrics::{EpochMetrics, HIL, Mean, WARM_START};
 use super::policy::Policy;
+use super::run::{Hooks, Run};
+use super::selection::Selection;
 use super::{Dynamics, pretrain_dynamics::Batches};
 use crate::config::{Alpha, TrainSettings};
 use crate::demo::Demo;
 use crate::error::{Error, Result};
-use crate::interrupt::Interrupt;
 use crate::nn::cosine;
 use crate::seed::stream;
 use crate::table::Table;
@@ -39,20 +40,21 @@ impl Method {
 /// What training leaves behind.
 #[derive(Clone, Debug)]
 pub struct Trained {
-    /// pi_theta, averaged weights.
+    /// pi_theta, averaged weights: the last, or the one that rollouts have chosen.
     pub policy: Policy,
     /// f_phi, fine-tuned if the settings say so.
     pub dynamics: Option<Dynamics>,
     /// One row an epoch.
     pub metrics: Table,
+    /// How the policy was chosen, with `train.select_episodes` above 0.
+    pub selection: Option<Selection>,
 }
 
-/// Trains a policy on `train`; `log` is called after every epoch.
+/// Trains a policy on `train`. A run that goes on from a checkpoint of the same run ends with the same bits.
 ///
 /// # Errors
 /// [`Error::Usage`] for a setting out of range or a missing dynamics network; [`Error::Failed`] without demos, for a dynamics network
-/// of another task, or when a loss is not a number; [`Error::Interrupted`].
-#[allow(clippy::too_many_arguments, reason = "each is a separate input of the stage")]
+/// of another task, a checkpoint that does not fit, or when a loss is not a number; [`Error::Interrupted`]; what rollouts return.
 pub fn train(
     method: Method,
     train: &[Demo],
@@ -60,46 +62,38 @@ pub fn train(
     dynamics: Option<Dynamics>,
     settings: &TrainSettings,
     seed: u64,
-    log: &mut dyn FnMut(&EpochMetrics),
-    interrupt: &Interrupt,
+    hooks: Hooks,
 ) -> Result<Trained> {
     settings.validate()?;
     let alpha = method.alpha(settings);
     if alpha != Alpha::Fixed(0.0) && dynamics.is_none() {
         return Err(Error::Usage("state cloning needs a dynamics network: run `hilt pretrain` first, or train with bc".into()));
     }
-    let mut learner = Learner::new(train, validation, dynamics, settings, seed)?;
-    let mut epochs = Vec::new();
-    let mut log = |metrics: EpochMetrics| {
-        log(&metrics);
-        epochs.push(metrics);
-    };
-    if method != Method::Sc {
-        warm_start(&mut learner, settings, &mut log, interrupt)?;
+    let mut run = Run::new(Learner::new(train, validation, dynamics, settings, seed)?, settings, hooks)?;
+    let warm = method != Method::Sc && !run.reached(HIL);
+    let warmed = if warm { warm_start(&mut run, settings) } else { Ok(()) };
+    match warmed.and_then(|()| hybrid_imitation_learning(&mut run, alpha, settings)) {
+        Ok(()) => Ok(run.finish()),
+        Err(why) => {
+            run.keep_last();
+            Err(why)
+        }
     }
-    hybrid_imitation_learning(&mut learner, alpha, settings, &mut log, interrupt)?;
-    let (policy, dynamics) = learner.finish();
-    Ok(Trained { policy, dynamics, metrics: table(&epochs) })
 }
 
 /// Behavior cloning on pairs shuffled across demos: d_conv passes .9 within a few hundred updates of Algorithm 1, which starves L_BC
 /// before the rare phases of a task are learned.
-fn warm_start(
-    learner: &mut Learner,
-    settings: &TrainSettings,
-    log: &mut impl FnMut(EpochMetrics),
-    interrupt: &Interrupt,
-) -> Result<()> {
-    let per_epoch = Batches::new(&learner.corpus, settings.bc_batch).per_epoch();
+fn warm_start(run: &mut Run, settings: &TrainSettings) -> Result<()> {
+    let per_epoch = Batches::new(&run.learner.corpus, settings.bc_batch).per_epoch();
     let total = settings.warm_start_updates;
-    learner.begin_stage();
-    for epoch in 0..total.div_ceil(per_epoch) {
-        let batches = Batches::new(&learner.corpus, settings.bc_batch);
-        let shuffled = batches.shuffled(&mut stream(learner.seed, "train.warm-start", epoch));
+    for epoch in run.enter(WARM_START)..total.div_ceil(per_epoch) {
+        let batches = Batches::new(&run.learner.corpus, settings.bc_batch);
+        let shuffled = batches.shuffled(&mut stream(run.learner.seed, "train.warm-start", epoch));
         let (mut l_bc, mut d_conv) = (Mean::default(), Mean::default());
-        let mut metrics = EpochMetrics::new("warm-start", epoch + 1, total.div_ceil(per_epoch));
-        for rows in shuffled.iter().take((total - learner.updates) as usize) {
-            interrupt.check()?;
+        let mut metrics = EpochMetrics::new(WARM_START, epoch + 1, total.div_ceil(per_epoch));
+        for rows in shuffled.iter().take((total - run.learner.updates) as usize) {
+            run.check()?;
+            let learner = &mut run.learner;
             let cloned = learner.behavior_cloning(rows, rows.len() as f64 / learner.mean_length())?;
             metrics.learning_rate =
                 cosine(settings.warm_start_learning_rate, settings.final_learning_rate, learner.updates, total);
@@ -108,30 +102,28 @@ fn warm_start(
             d_conv.add(cloned.d_conv);
         }
         (metrics.l_bc, metrics.l_mix, metrics.d_conv, metrics.alpha) = (l_bc.get(), l_bc.get(), d_conv.get(), 0.0);
-        log(learner.validate(metrics));
+        run.end_epoch(metrics, None)?;
     }
-    learner.end_stage();
+    run.learner.end_stage();
     Ok(())
 }
 
-fn hybrid_imitation_learning(
-    learner: &mut Learner,
-    alpha: Alpha,
-    settings: &TrainSettings,
-    log: &mut impl FnMut(EpochMetrics),
-    interrupt: &Interrupt,
-) -> Result<()> {
-    let mut order: Vec<usize> = (0..learner.corpus.demos()).collect();
+fn hybrid_imitation_learning(run: &mut Run, alpha: Alpha, settings: &TrainSettings) -> Result<()> {
+    let seed = run.learner.seed;
+    let mut order: Vec<usize> = (0..run.learner.corpus.demos()).collect();
     let batch = settings.batch.min(order.len());
     let per_epoch = order.len().div_ceil(batch) as u64;
-    let mut mixing = Mixing::new(alpha, settings, per_epoch);
-    learner.begin_stage();
-    for epoch in 0..settings.epochs {
-        order.shuffle(&mut stream(learner.seed, "train.order", epoch));
+    let mut mixing = Mixing { average: run.alpha_average(), ..Mixing::new(alpha, settings, per_epoch) };
+    let done = run.enter(HIL);
+    // Each epoch shuffles the order of the one before.
+    (0..done).for_each(|past| order.shuffle(&mut stream(seed, "train.order", past)));
+    for epoch in done..settings.epochs {
+        order.shuffle(&mut stream(seed, "train.order", epoch));
         let [mut l_bc, mut l_sc, mut l_mix, mut d_conv, mut alphas, mut l_model] = [Mean::default(); 6];
-        let mut metrics = EpochMetrics::new("hil", epoch + 1, settings.epochs);
+        let mut metrics = EpochMetrics::new(HIL, epoch + 1, settings.epochs);
         for (i, demos) in order.chunks(batch).enumerate() {
-            interrupt.check()?;
+            run.check()?;
+            let learner = &mut run.learner;
             let rows = learner.rows_of(demos);
             let cloned = learner.behavior_cloning(&rows, demos.len() as f64)?; // Algorithm 2, Eq. 3-4
             let alpha = mixing.weight(cloned.d_conv); // alpha_e = d_conv, no gradient through it
@@ -156,9 +148,9 @@ fn hybrid_imitation_learning(
         }
         (metrics.l_bc, metrics.l_sc, metrics.l_mix) = (l_bc.get(), l_sc.get(), l_mix.get());
         (metrics.d_conv, metrics.alpha, metrics.l_model) = (d_conv.get(), alphas.get(), l_model.get());
-        log(learner.validate(metrics));
+        run.end_epoch(metrics, mixing.average)?;
     }
-    learner.end_stage();
+    run.learner.end_stage();
     Ok(())
 }
 

@@ -16,10 +16,13 @@ use crate::nn::{Adam, Ema, clip_by_global_norm, gaussian, global_norm};
 use crate::seed::stream;
 
 /// A parameter vector's way down.
-struct Descent {
-    adam: Adam,
-    ema: Ema,
+pub(super) struct Descent {
+    pub adam: Adam,
+    pub ema: Ema,
 }
+
+/// Norm of a gradient above which Adam's second moment, a square, would not fit into an f32.
+const LARGEST_NORM: f64 = 1e19;
 
 impl Descent {
     fn new(params: &[f32], ema_decay: f64) -> Self {
@@ -34,16 +37,18 @@ pub struct Learner {
     pub(super) corpus: Corpus,
     /// Updates of the present stage.
     pub(super) updates: u64,
-    skipped: u64,
-    settings: TrainSettings,
+    pub(super) skipped: u64,
+    /// The loss whose gradient made the last update be left out.
+    pub(super) left_out: &'static str,
+    pub(super) settings: TrainSettings,
     pub(super) policy: Policy,
-    averaged: Policy,
+    pub(super) averaged: Policy,
     samples: Samples,
     held_out: Corpus,
     held_out_samples: Samples,
     pub(super) model: Option<Model>,
-    net_descent: Descent,
-    std_descent: Descent,
+    pub(super) net_descent: Descent,
+    pub(super) std_descent: Descent,
     bc_choices: bc::Choices,
     sc_choices: sc::Choices,
     bc_work: bc::Workspace,
@@ -54,7 +59,7 @@ pub struct Learner {
     pushes: Pushes,
     gradient: Vec<f32>,
     /// Counts updates of all stages: the number of the random streams.
-    draws: u64,
+    pub(super) draws: u64,
 }
 
 impl Learner {
@@ -85,6 +90,7 @@ impl Learner {
             seed,
             updates: 0,
             skipped: 0,
+            left_out: "",
             samples: corpus.policy_samples(&policy),
             held_out_samples: held_out.policy_samples(&policy),
             model,
@@ -173,7 +179,11 @@ impl Learner {
             pushes: self.pushes.rows(),
         };
         let l_sc = sc::state_cloning(&self.policy, &model.dynamics, batch, &self.segments, choices, &mut self.sc_work);
-        self.finite("L_SC (Eq. 5)", l_sc, "raise train.rho, set train.clip_norm or lower train.learning_rate")?;
+        self.finite(
+            "L_SC (Eq. 5)",
+            l_sc,
+            "raise train.rho, set train.clip_norm, or lower train.learning_rate or train.dynamics_learning_rate",
+        )?;
         Ok(l_sc)
     }
 
@@ -181,7 +191,7 @@ impl Learner {
         if value.is_finite() {
             return Ok(());
         }
-        Err(Error::Failed(format!("{term} is {value} at update {}: {remedy}", self.updates + 1)))
+        Err(Error::Failed(format!("{term} is {value} after {} updates of the stage: {remedy}", self.updates)))
     }
 
     /// Gradient of (1 - alpha) L_BC + alpha L_SC into `self.gradient`.
@@ -204,6 +214,13 @@ impl Learner {
         (bc, global_norm(&self.gradient))
     }
 
+    /// The loss whose gradient is no use.
+    fn unusable_gradient(&mut self, with_sc: bool) -> &'static str {
+        let bc = self.gradient_norms(with_sc).0;
+        let spread = self.bc_work.d_log_std.iter().all(|d| d.is_finite());
+        if with_sc && bc <= LARGEST_NORM && spread { "L_SC (Eq. 5)" } else { "L_BC (Eq. 3)" }
+    }
+
     /// theta <- theta - grad L_mix, by Adam. An update whose gradient is not finite (long rollouts without recovery) is left out.
     pub fn update(&mut self, alpha: f64, sc_scale: f64, learning_rate: f64) {
         self.updates += 1;
@@ -214,8 +231,10 @@ impl Learner {
             let sc = if alpha > 0.0 { self.sc_work.d_log_std } else { Default::default() };
             d_log_std = std::array::from_fn(|i| (1.0 - alpha) as f32 * d_log_std[i] + alpha as f32 * sc[i]);
         }
-        if !norm.is_finite() || d_log_std.iter().any(|d| !d.is_finite()) {
+        let too_long = self.settings.clip_norm == 0.0 && norm > LARGEST_NORM;
+        if !norm.is_finite() || too_long || !d_log_std.iter().all(|d| f64::from(d.abs()) <= LARGEST_NORM) {
             self.skipped += 1;
+            self.left_out = self.unusable_gradient(alpha > 0.0);
             return;
         }
         self.net_descent.adam.step(&mut self.policy.net.params_mut(), &self.gradient, learning_rate);
@@ -234,15 +253,22 @@ impl Learner {
         let Some(model) = &mut self.model else {
             return Ok(f64::NAN);
         };
-        let l_model = model.fine_tune(rows, mean_length, learning_rate);
-        self.finite("the loss of the dynamics network (Eq. 6)", l_model, "lower train.dynamics_learning_rate")?;
+        let (l_model, norm) = model.fine_tune(rows, mean_length, learning_rate);
+        let remedy = "lower train.dynamics_learning_rate";
+        self.finite("the loss of the dynamics network (Eq. 6)", l_model, remedy)?;
+        self.finite("the gradient of the dynamics network's loss (Eq. 6)", norm, remedy)?;
         Ok(l_model)
+    }
+
+    /// Brings the policy with the averaged weights up to date.
+    pub(super) fn update_averaged(&mut self) {
+        self.averaged.net.params_mut().copy_from_slice(self.net_descent.ema.average());
+        self.averaged.log_std.copy_from_slice(self.std_descent.ema.average());
     }
 
     /// Completes an epoch's metrics with the averaged weights' errors on the validation demos.
     pub fn validate(&mut self, mut metrics: EpochMetrics) -> EpochMetrics {
-        self.averaged.net.params_mut().copy_from_slice(self.net_descent.ema.average());
-        self.averaged.log_std.copy_from_slice(self.std_descent.ema.average());
+        self.update_averaged();
         let rows: Vec<usize> = (0..self.held_out.rows()).collect();
         let demos = self.held_out.demos() as f64;
         let batch = bc::Batch { samples: &self.held_out_samples, rows: &rows, demos };

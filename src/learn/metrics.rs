@@ -1,26 +1,47 @@
 //! What is known after each epoch of learning, and the table of all epochs.
 
 use super::corpus::{Samples, row};
+use super::exact;
 use crate::state::{ARM_JOINTS, JOINTS};
 use crate::table::{Table, Values};
+use serde::{Deserialize, Deserializer, Serialize, de};
 
 /// Labelled finger velocity above which the hand closes or holds, and below whose negative it opens \[rad/s\].
 const FINGER_COMMAND_RAD_S: f32 = 0.2;
 
+/// The stages of learning: Algorithm 4, the warm start, Algorithm 1.
+pub const STAGES: [&str; 3] = ["pretrain", WARM_START, HIL];
+/// Behavior cloning alone, before Algorithm 1.
+pub const WARM_START: &str = "warm-start";
+/// Algorithm 1.
+pub const HIL: &str = "hil";
+
+/// A name out of [`STAGES`].
+pub type StageName = &'static str;
+
+fn known_stage<'de, D: Deserializer<'de>>(text: D) -> Result<StageName, D::Error> {
+    let name = String::deserialize(text)?;
+    let known = STAGES.into_iter().find(|stage| *stage == name);
+    known.ok_or_else(|| de::Error::custom(format!("unknown stage \"{name}\"; known: {}", STAGES.join(", "))))
+}
+
 /// Root mean square error of the mean action on the validation demos \[rad/s\].
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct ActionError {
     /// The six arm joints.
+    #[serde(with = "exact")]
     pub arm: f64,
     /// The three fingers.
+    #[serde(with = "exact")]
     pub fingers: f64,
 }
 
 /// One epoch. What was not computed is NaN.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct EpochMetrics {
-    /// "pretrain", "warm-start" or "hil".
-    pub stage: &'static str,
+    /// One of [`STAGES`].
+    #[serde(deserialize_with = "known_stage")]
+    pub stage: StageName,
     /// Epoch of the stage, from 1.
     pub epoch: u64,
     /// Epochs of the stage.
@@ -28,26 +49,37 @@ pub struct EpochMetrics {
     /// Updates of the stage so far.
     pub updates: u64,
     /// Learning rate of the last update.
+    #[serde(with = "exact")]
     pub learning_rate: f64,
     /// L_BC, mean of the epoch.
+    #[serde(with = "exact")]
     pub l_bc: f64,
     /// L_SC, mean of the epoch.
+    #[serde(with = "exact")]
     pub l_sc: f64,
     /// L_mix, mean of the epoch.
+    #[serde(with = "exact")]
     pub l_mix: f64,
     /// d_conv, mean of the epoch.
+    #[serde(with = "exact")]
     pub d_conv: f64,
     /// alpha, mean of the epoch.
+    #[serde(with = "exact")]
     pub alpha: f64,
     /// Loss of the dynamics network (Eq. 6) on training transitions, mean of the epoch.
+    #[serde(with = "exact")]
     pub l_model: f64,
     /// L_BC of the averaged weights on the validation demos.
+    #[serde(with = "exact")]
     pub validation_l_bc: f64,
     /// Loss of the dynamics network on the validation demos.
+    #[serde(with = "exact")]
     pub validation_l_model: f64,
     /// Norm of the gradient of L_BC alone at the epoch's first update.
+    #[serde(with = "exact")]
     pub grad_bc: f64,
     /// Norm of the gradient of L_SC alone at the epoch's first update.
+    #[serde(with = "exact")]
     pub grad_sc: f64,
     /// Updates left out so far because a gradient was not finite.
     pub skipped: u64,
@@ -56,6 +88,11 @@ pub struct EpochMetrics {
 }
 
 impl EpochMetrics {
+    /// Where training stands after the epoch: "hil epoch 3 of 60".
+    pub fn place(&self) -> String {
+        format!("{} epoch {} of {}", self.stage, self.epoch, self.epochs)
+    }
+
     /// Nothing known yet.
     pub(super) fn new(stage: &'static str, epoch: u64, epochs: u64) -> Self {
         let nan = f64::NAN;

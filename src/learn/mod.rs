@@ -1,9 +1,11 @@
 //! The paper's method: hybrid imitation learning and its parts, one file an algorithm.
 
 pub mod behavior_cloning;
+mod checkpoint;
 mod corpus;
 mod cost;
 mod dynamics;
+mod exact;
 mod features;
 mod fine_tuning;
 #[cfg(test)]
@@ -17,8 +19,12 @@ mod policy;
 pub mod pretrain_dynamics;
 mod pushes;
 mod regression;
+#[cfg(test)]
+mod resume_tests;
 mod rollout;
+mod run;
 mod scaling;
+mod selection;
 mod shards;
 pub mod state_cloning;
 #[cfg(test)]
@@ -27,6 +33,7 @@ mod testing;
 mod training_tests;
 mod weights;
 
+pub use checkpoint::Checkpoint;
 pub use dynamics::Dynamics;
 pub use features::Features;
 pub use hil::{Method, Trained, train};
@@ -35,3 +42,5 @@ pub use metrics::EpochMetrics;
 pub use model_report::ModelReport;
 pub use policy::Policy;
 pub use pretrain_dynamics::pretrain_dynamics;
+pub use run::{Hooks, Score};
+pub use selection::{Candidate, Selection};

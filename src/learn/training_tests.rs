@@ -1,7 +1,7 @@
 //! Training from end to end on toy demos.
 
 use super::testing::{demo, demos};
-use super::{Dynamics, Method, Policy, Trained, pretrain_dynamics, train};
+use super::{Dynamics, Hooks, Method, Policy, Trained, pretrain_dynamics, train};
 use crate::config::{Alpha, PretrainSettings, TrainSettings};
 use crate::demo::Demo;
 use crate::error::{Error, Result};
@@ -30,7 +30,7 @@ fn quick() -> TrainSettings {
 
 fn run(method: Method, settings: &TrainSettings, dynamics: Option<Dynamics>) -> Result<Trained> {
     let (demos, held_out) = (demos(Task::Stack, 8, 30, 0), demos(Task::Stack, 2, 30, 100));
-    train(method, &demos, &held_out, dynamics, settings, 7, &mut |_| {}, &Interrupt::default())
+    train(method, &demos, &held_out, dynamics, settings, 7, Hooks::new(&Interrupt::default()))
 }
 
 fn bytes(policy: &Policy) -> Vec<u32> {
@@ -81,7 +81,7 @@ fn a_toy_is_learned_by_each_method() {
     let error = |method: Method, settings: &TrainSettings| -> f64 {
         let go = Interrupt::default();
         let model = Some(dynamics.clone());
-        let trained = train(method, &many, &held_out, model, settings, 7, &mut |_| {}, &go).expect("trains");
+        let trained = train(method, &many, &held_out, model, settings, 7, Hooks::new(&go)).expect("trains");
         let policy = trained.policy;
         let square = |t: usize| -> f64 {
             let label = &unseen.actions()[t * JOINTS..(t + 1) * JOINTS];
@@ -98,20 +98,11 @@ fn a_toy_is_learned_by_each_method() {
 
 #[test]
 fn metrics_have_one_row_an_epoch() {
-    let mut logged = Vec::new();
+    let (mut logged, go) = (Vec::new(), Interrupt::default());
+    let hooks = Hooks { log: Box::new(|m| logged.push(m.clone())), ..Hooks::new(&go) };
     let (train_demos, held_out) = (demos(Task::Stack, 8, 30, 0), demos(Task::Stack, 2, 30, 100));
     let dynamics = pretrain(Task::Stack, 1).0;
-    let trained = train(
-        Method::Hil,
-        &train_demos,
-        &held_out,
-        Some(dynamics),
-        &quick(),
-        7,
-        &mut |m| logged.push(m.clone()),
-        &Interrupt::default(),
-    )
-    .expect("trains");
+    let trained = train(Method::Hil, &train_demos, &held_out, Some(dynamics), &quick(), 7, hooks).expect("trains");
     assert_eq!(trained.metrics.rows(), logged.len());
     let last = logged.last().expect("epochs");
     assert_eq!((last.stage, last.epoch, last.epochs, last.updates), ("hil", 4, 4, 8));
@@ -139,14 +130,14 @@ fn what_cannot_work_is_refused_in_words() {
 
     let none: &[Demo] = &[];
     let go = Interrupt::default();
-    let error = train(Method::Bc, none, none, None, &quick(), 0, &mut |_| {}, &go).expect_err("no demos");
+    let error = train(Method::Bc, none, none, None, &quick(), 0, Hooks::new(&go)).expect_err("no demos");
     assert!(error.to_string().contains("no training demo"));
     let diverging = TrainSettings { warm_start_learning_rate: 1e30, clip_norm: 0.0, ..quick() };
     let message = refused(Method::Bc, &diverging, None).to_string();
     assert!(message.contains("L_BC"), "{message}");
     go.raise();
     let (some, held_out) = (demos(Task::Stack, 2, 9, 0), demos(Task::Stack, 1, 9, 9));
-    let error = train(Method::Bc, &some, &held_out, None, &quick(), 0, &mut |_| {}, &go).expect_err("interrupted");
+    let error = train(Method::Bc, &some, &held_out, None, &quick(), 0, Hooks::new(&go)).expect_err("interrupted");
     assert!(matches!(error, Error::Interrupted));
 }
 
@@ -190,7 +181,7 @@ fn the_literal_preset_parses_and_trains() {
     for rho in [0.0, 0.6, 1.0] {
         let settings = TrainSettings { rho, ..settings.clone() };
         let model = Some(dynamics.clone());
-        let trained = train(Method::Hil, &some, &held_out, model, &settings, 0, &mut |_| {}, &go).expect("trains");
+        let trained = train(Method::Hil, &some, &held_out, model, &settings, 0, Hooks::new(&go)).expect("trains");
         assert_eq!(trained.metrics.rows(), 3);
     }
     let alpha = |text: &str| toml::from_str::<TrainSettings>(text).map(|s| s.alpha).map_err(|e| e.to_string());

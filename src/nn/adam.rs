@@ -21,6 +21,20 @@ impl Adam {
         Adam { first: vec![0.0; len], second: vec![0.0; len], steps: 0 }
     }
 
+    /// First and second moments, and how many steps made them.
+    pub fn state(&self) -> (&[f32], &[f32], u32) {
+        (&self.first, &self.second, self.steps)
+    }
+
+    /// The inverse of [`Adam::state`].
+    ///
+    /// # Panics
+    /// When the moments differ in length.
+    pub fn from_state(first: Vec<f32>, second: Vec<f32>, steps: u32) -> Self {
+        assert_eq!(first.len(), second.len(), "a parameter has two moments");
+        Adam { first, second, steps }
+    }
+
     /// One step down the gradient.
     pub fn step(&mut self, params: &mut [f32], gradient: &[f32], learning_rate: f64) {
         self.steps += 1;
@@ -72,6 +86,16 @@ impl Ema {
     /// Starts at `params`; a `decay` of 0 follows them exactly.
     pub fn new(params: &[f32], decay: f64) -> Self {
         Ema { average: params.to_vec(), decay: decay as f32, updates: 0 }
+    }
+
+    /// How many updates the average has seen.
+    pub fn updates(&self) -> u32 {
+        self.updates
+    }
+
+    /// An average that has seen `updates` of them.
+    pub fn from_state(average: Vec<f32>, decay: f64, updates: u32) -> Self {
+        Ema { average, decay: decay as f32, updates }
     }
 
     /// Takes in the parameters after an update.

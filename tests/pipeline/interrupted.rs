@@ -15,11 +15,11 @@ const PATIENCE: Duration = Duration::from_secs(20);
 /// Recordings that take seconds to read and to write.
 const MANY: usize = 4000;
 
-fn start(words: Vec<String>) -> Child {
+pub fn start(words: Vec<String>) -> Child {
     Command::new(HILT).args(words).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().expect("the binary runs")
 }
 
-fn signal(child: &Child, name: &str) {
+pub fn signal(child: &Child, name: &str) {
     let sent = Command::new("kill").args([format!("-{name}"), child.id().to_string()]).status().expect("kill runs");
     assert!(sent.success(), "the process has ended already");
 }
@@ -43,6 +43,11 @@ fn interrupted_by(name: &str, run: &Run, words: Vec<String>, wait: Duration) {
     assert_eq!(output.status.code(), Some(130), "{what}: {stderr}");
     assert!(stderr.contains("error: interrupted; no artefact was changed"), "{what}: {stderr}");
     assert!(output.stdout.is_empty(), "{what} printed a result");
+    if what.contains("\"train\"") {
+        // Training leaves its checkpoint, and nothing else.
+        assert!(stderr.contains("policy.checkpoint.safetensors: run the same command with --resume"), "{stderr}");
+        fs::remove_file(run.at("policy.checkpoint.safetensors")).expect("the checkpoint");
+    }
     run.unchanged(&what, &before);
 }
 

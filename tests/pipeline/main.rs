@@ -7,4 +7,5 @@ mod fixtures;
 mod full_disk;
 mod interrupted;
 mod reproducible;
+mod resume;
 mod runs;
