@@ -82,10 +82,8 @@ pub fn behavior_cloning(policy: &Policy, batch: Batch, choices: &Choices, rng: &
         let part = shards::range(rows, shards::count(rows), i);
         let panels = panels_of(part.len());
         shard.pass.reserve(&policy.net, panels);
-        for (slot, r) in part.clone().enumerate() {
-            shard.pass.input.write_row(slot, row(&batch.samples.inputs, policy.net.inputs(), batch.rows[r]));
-        }
-        shard.pass.input.clear_tail(part.len());
+        let inputs = |slot: usize| row(&batch.samples.inputs, policy.net.inputs(), batch.rows[part.start + slot]);
+        shard.pass.input.write_rows(0, part.len(), inputs);
         policy.net.forward(&mut shard.pass, 0..panels);
         let eps = if samples { &noise[part.start * JOINTS..part.end * JOINTS] } else { &[] };
         shard.losses(policy, batch, &batch.rows[part], eps, choices);
@@ -190,7 +188,6 @@ pub fn policy_gradient(
             policy.net.backward(&mut shard.pass, block.clone());
             policy.net.add_gradient(&mut shard.pass, block);
         }
-        shard.gradient.clear();
         shard.gradient.resize(policy.net.params().len(), 0.0);
         policy.net.finish_gradient(&shard.pass, &mut shard.gradient);
     });

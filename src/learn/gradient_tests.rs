@@ -268,7 +268,9 @@ fn step_by_step(world: &World, gradient: &mut [f32]) -> f64 {
         }
         policy.net.begin_gradient(&mut pi);
         policy.net.add_gradient(&mut pi, 0..steps);
-        policy.net.finish_gradient(&pi, gradient);
+        let mut of_demo = vec![0.0; gradient.len()];
+        policy.net.finish_gradient(&pi, &mut of_demo);
+        add_scaled(gradient, &of_demo, 1.0);
         at += steps;
     }
     l_sc

@@ -2,7 +2,7 @@
 
 use super::corpus::{Samples, row};
 use super::shards;
-use crate::nn::{BLOCK_PANELS, LANES, Lanes, Mlp, Pass, panels_of};
+use crate::nn::{BLOCK_PANELS, LANES, Lanes, Mlp, Pass, kernel, panels_of};
 use rayon::prelude::*;
 
 /// Where Huber's function turns from a parabola into a line, in standard deviations.
@@ -64,7 +64,6 @@ impl Shard {
             self.block(net, samples, rows, loss, learn);
         }
         if learn {
-            self.gradient.clear();
             self.gradient.resize(net.params().len(), 0.0);
             net.finish_gradient(&self.pass, &mut self.gradient);
         }
@@ -72,10 +71,7 @@ impl Shard {
 
     fn block(&mut self, net: &Mlp, samples: &Samples, rows: &[usize], loss: &Loss, learn: bool) {
         let panels = panels_of(rows.len());
-        for (slot, r) in rows.iter().enumerate() {
-            self.pass.input.write_row(slot, row(&samples.inputs, net.inputs(), *r));
-        }
-        self.pass.input.clear_tail(rows.len());
+        self.pass.input.write_rows(0, rows.len(), |slot| row(&samples.inputs, net.inputs(), rows[slot]));
         net.forward(&mut self.pass, 0..panels);
         for (p, rows) in rows.chunks(LANES).enumerate() {
             self.panel_loss(samples, p, rows, loss);
@@ -89,10 +85,10 @@ impl Shard {
     /// Loss of one panel, and its gradient; lanes without a row have no error.
     fn panel_loss(&mut self, samples: &Samples, p: usize, rows: &[usize], loss: &Loss) {
         let (output, d_output) = (self.pass.output.panel(p), self.pass.d_output.panel_mut(p));
-        d_output.copy_from_slice(output);
-        for (lane, r) in rows.iter().enumerate() {
-            let target = row(&samples.targets, output.len(), *r);
-            d_output.iter_mut().zip(target).for_each(|(slot, value)| slot.0[lane] = *value);
+        let target = |lane: usize| row(&samples.targets, output.len(), rows[lane.min(rows.len() - 1)]);
+        kernel::interleave(d_output, std::array::from_fn(target));
+        for (target, output) in d_output.iter_mut().zip(output) {
+            target.0[rows.len()..].copy_from_slice(&output.0[rows.len()..]);
         }
         let mut sum = Lanes::default();
         for ((d, output), weight) in d_output.iter_mut().zip(output).zip(&loss.weights) {

@@ -2,7 +2,7 @@
 
 use super::Pass;
 use super::activation::Activation;
-use super::kernel::{Coefficients, Start, prefetch, product};
+use super::kernel::{Coefficients, Finish, Product, Start, product};
 use super::lanes::Lanes;
 use super::pass::BLOCK_PANELS;
 use rand::{Rng, RngExt};
@@ -133,12 +133,9 @@ impl Mlp {
             let (below, above) = pass.hidden.split_at_mut(layer);
             let x = if layer == 0 { &pass.input } else { &below[layer - 1] };
             let y = if layer + 1 == self.layers() { &mut pass.output } else { &mut above[0] };
-            let y = y.span_mut(panels);
-            let weights = Coefficients::Matrix(&self.params[weights]);
-            product(y, outputs, x.span(panels), inputs, weights, Start::Bias(&self.params[biases]));
-            if layer + 1 < self.layers() {
-                self.activation.forward(y);
-            }
+            let (a, start) = (Coefficients::Matrix(&self.params[weights]), Start::Bias(&self.params[biases]));
+            let finish = if layer + 1 < self.layers() { self.activation.forward() } else { Finish::Nothing };
+            product(y.span_mut(panels), outputs, Product { x: x.span(panels), depth: inputs, a, start, finish });
         }
     }
 
@@ -152,22 +149,20 @@ impl Mlp {
             let (below, above) = pass.d_hidden.split_at_mut(layer);
             let dy = if layer + 1 == self.layers() { &pass.d_output } else { &above[0] };
             let (dx, y) = (below[layer - 1].span_mut(panels), pass.hidden[layer - 1].span(panels));
-            prefetch(y);
-            self.input_gradient(layer, dx, dy.span(panels));
-            self.activation.backward(dx, y);
+            self.input_gradient(layer, dx, dy.span(panels), self.activation.backward(y));
         }
     }
 
     /// `pass.d_input` of these panels, after [`Mlp::backward`].
     pub fn backward_input(&self, pass: &mut Pass, panels: Range<usize>) {
-        self.input_gradient(0, pass.d_input.span_mut(&panels), pass.d_hidden[0].span(&panels));
+        self.input_gradient(0, pass.d_input.span_mut(&panels), pass.d_hidden[0].span(&panels), Finish::Nothing);
     }
 
-    /// dx = dy w^T.
-    fn input_gradient(&self, layer: usize, dx: &mut [Lanes], dy: &[Lanes]) {
+    /// dx = finish(dy w^T).
+    fn input_gradient(&self, layer: usize, dx: &mut [Lanes], dy: &[Lanes], finish: Finish) {
         let (weights, _) = self.layer_ranges(layer);
-        let transposed = Coefficients::Matrix(&self.transposed[weights]);
-        product(dx, self.widths[layer], dy, self.widths[layer + 1], transposed, Start::Zero);
+        let a = Coefficients::Matrix(&self.transposed[weights]);
+        product(dx, self.widths[layer], Product { x: dy, depth: self.widths[layer + 1], a, start: Start::Zero, finish });
     }
 
     /// Starts the sum of the parameters' gradient in the workspace.
@@ -187,14 +182,14 @@ impl Mlp {
         }
     }
 
-    /// Adds the sum to `gradient`, laid out as the parameters.
+    /// Writes the sum into `gradient`, laid out as the parameters.
     ///
     /// # Panics
     /// When `gradient` is shorter than the parameters.
     pub fn finish_gradient(&self, pass: &Pass, gradient: &mut [f32]) {
         for layer in 0..self.layers() {
             let (weights, biases) = self.layer_ranges(layer);
-            pass.sums.add_to(layer, &mut gradient[weights.start..biases.end], self.widths[layer + 1]);
+            pass.sums.write(layer, &mut gradient[weights.start..biases.end], self.widths[layer + 1]);
         }
     }
 }
