@@ -99,6 +99,28 @@ pub fn draw_noise(wanted: bool, rows: usize, rng: &mut impl Rng, noise: &mut Vec
     }
 }
 
+impl Workspace {
+    /// With room for batches of at most `most_rows` state-action pairs.
+    pub fn new(policy: &Policy, most_rows: usize) -> Self {
+        let rows = shards::most_rows(most_rows);
+        let shard = || {
+            let mut shard = Shard {
+                d_bc: Vec::with_capacity(rows * JOINTS),
+                gradient: vec![0.0; policy.net.params().len()],
+                ..Shard::default()
+            };
+            shard.pass.provide(&policy.net, panels_of(rows));
+            shard
+        };
+        Workspace {
+            shards: (0..shards::MAX_SHARDS).map(|_| shard()).collect(),
+            noise: Vec::with_capacity(most_rows * JOINTS),
+            mean: Vec::with_capacity(most_rows * JOINTS),
+            ..Workspace::default()
+        }
+    }
+}
+
 impl Shard {
     fn losses(&mut self, policy: &Policy, batch: Batch, rows: &[usize], noise: &[f32], choices: &Choices) {
         let unit = &policy.action_scaling().std;

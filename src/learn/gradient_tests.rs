@@ -26,14 +26,15 @@ struct World {
 
 fn world(task: Task, structure: Structure, settings: TrainSettings) -> World {
     let corpus = Corpus::new(&demos(task, 8, 20, 5), "training").expect("demos");
-    let mut rng = stream(2, "world", 0);
+    let (mut rng, mut rows) = (stream(2, "world", 0), Vec::new());
+    corpus.rows_of(&[6, 1, 3, 0, 5, 2, 4, 7], &mut rows);
     let policy = Policy::new(&corpus, &settings, &mut rng);
     let pretrain = PretrainSettings { structure, hidden_units: 16, features: settings.features, ..Default::default() };
     let dynamics = Dynamics::new(&corpus, &pretrain, &mut rng);
     World {
         samples: corpus.policy_samples(&policy),
         model_inputs: corpus.model_samples(&dynamics).inputs,
-        rows: corpus.rows_of(&[6, 1, 3, 0, 5, 2, 4, 7]),
+        rows,
         corpus,
         policy,
         dynamics,

@@ -125,6 +125,7 @@ fn hybrid_imitation_learning(
     let batch = settings.batch.min(order.len());
     let per_epoch = order.len().div_ceil(batch) as u64;
     let mut mixing = Mixing::new(alpha, settings, per_epoch);
+    let mut rows = Vec::new();
     learner.begin_stage();
     for epoch in 0..settings.epochs {
         order.shuffle(&mut stream(learner.seed, "train.order", epoch));
@@ -132,7 +133,7 @@ fn hybrid_imitation_learning(
         let mut metrics = EpochMetrics::new("hil", epoch + 1, settings.epochs);
         for (i, demos) in order.chunks(batch).enumerate() {
             interrupt.check()?;
-            let rows = learner.rows_of(demos);
+            learner.rows_of(demos, &mut rows);
             let cloned = learner.behavior_cloning(&rows, demos.len() as f64)?; // Algorithm 2, Eq. 3-4
             let alpha = mixing.weight(cloned.d_conv); // alpha_e = d_conv, no gradient through it
             let sc = if alpha > 0.0 { learner.state_cloning(demos, &rows)? } else { f64::NAN }; // Algorithm 3, Eq. 5

@@ -9,10 +9,10 @@ use rayon::prelude::*;
 const HUBER_KNEE: f32 = 1.0;
 
 /// sum over rows and entries of scale * weight_i * loss(error_i).
-#[derive(Clone, Debug)]
-pub struct Loss {
+#[derive(Clone, Copy, Debug)]
+pub struct Loss<'a> {
     /// Weight of each entry.
-    pub weights: Vec<f32>,
+    pub weights: &'a [f32],
     /// Factor of the sum.
     pub scale: f32,
     /// Huber's function instead of the square.
@@ -38,7 +38,8 @@ impl Regression {
     /// Loss of the network on `rows` of `samples`; with `learn`, its gradient too.
     pub fn loss(&mut self, net: &Mlp, samples: &Samples, rows: &[usize], loss: &Loss, learn: bool) -> f64 {
         let active = shards::count(rows.len());
-        self.shards.resize_with(active.max(self.shards.len()), Shard::default);
+        self.shards.resize_with(shards::MAX_SHARDS, Shard::default);
+        self.shards.iter_mut().for_each(|shard| shard.reserve(net));
         self.shards[..active].par_iter_mut().enumerate().for_each(|(i, shard)| {
             shard.run(net, samples, &rows[shards::range(rows.len(), active, i)], loss, learn);
         });
@@ -56,15 +57,19 @@ impl Regression {
 }
 
 impl Shard {
-    fn run(&mut self, net: &Mlp, samples: &Samples, rows: &[usize], loss: &Loss, learn: bool) {
+    fn reserve(&mut self, net: &Mlp) {
+        self.pass.provide(net, BLOCK_PANELS);
         self.pass.reserve(net, BLOCK_PANELS);
+        self.gradient.resize(net.params().len(), 0.0);
+    }
+
+    fn run(&mut self, net: &Mlp, samples: &Samples, rows: &[usize], loss: &Loss, learn: bool) {
         self.loss = 0.0;
         net.begin_gradient(&mut self.pass);
         for rows in rows.chunks(BLOCK_PANELS * LANES) {
             self.block(net, samples, rows, loss, learn);
         }
         if learn {
-            self.gradient.resize(net.params().len(), 0.0);
             net.finish_gradient(&self.pass, &mut self.gradient);
         }
     }
@@ -91,7 +96,7 @@ impl Shard {
             target.0[rows.len()..].copy_from_slice(&output.0[rows.len()..]);
         }
         let mut sum = Lanes::default();
-        for ((d, output), weight) in d_output.iter_mut().zip(output).zip(&loss.weights) {
+        for ((d, output), weight) in d_output.iter_mut().zip(output).zip(loss.weights) {
             let error = *output - *d;
             // Huber's function is a parabola up to the knee, and a line from there
             let knee = if loss.huber { HUBER_KNEE } else { f32::INFINITY };
@@ -126,7 +131,7 @@ mod tests {
         let samples = Samples { inputs: random(200 * 3, 2.0), targets: random(200 * 2, 6.0) };
         let rows: Vec<usize> = (0..200).collect();
         for huber in [false, true] {
-            let loss = Loss { weights: vec![1.0, 0.5], scale: 1.0 / 400.0, huber };
+            let loss = Loss { weights: &[1.0, 0.5], scale: 1.0 / 400.0, huber };
             let mut work = Regression::default();
             work.loss(&net, &samples, &rows, &loss, true);
             let gradient = work.gradient.clone();

@@ -70,10 +70,27 @@ impl Depth {
 }
 
 impl Rollout {
-    /// Takes in segments, sorted by length, longest first.
-    pub fn deal<'a>(&mut self, segments: impl Iterator<Item = &'a Segment>) {
+    /// Allocates for any segments of `rows` transitions, none of more than `longest` steps.
+    pub fn provide(&mut self, policy: &Policy, dynamics: &Dynamics, rows: usize, longest: usize) {
+        let (first, panels) = (panels_of(rows), panels_of(rows) + longest); // each depth may leave one panel half empty
+        self.policy.provide(&policy.net, panels);
+        self.model.provide(&dynamics.net, panels);
+        self.states.provide(dynamics.task().state_dim(), panels);
+        self.predictions.provide(BASE_DIM, panels);
+        self.d_states.provide(BASE_DIM, first);
+        [&mut self.actions, &mut self.noise, &mut self.d_first].map(|array| array.provide(JOINTS, first));
+        self.hands.reserve(panels.saturating_sub(self.hands.len()));
         self.segments.clear();
-        self.segments.extend(segments);
+        self.segments.reserve(rows);
+        self.counts.clear();
+        self.counts.reserve(longest);
+        self.gradient.resize(policy.net.params().len(), 0.0);
+    }
+
+    /// Takes in segments, sorted by length, longest first.
+    pub fn deal(&mut self, segments: &[Segment]) {
+        self.segments.clear();
+        self.segments.extend_from_slice(segments);
         self.counts.clear();
         self.counts.resize(self.segments.first().map_or(0, |s| s.steps), 0);
         for segment in &self.segments {
@@ -116,7 +133,6 @@ impl Rollout {
         }
         self.d_states.reserve(BASE_DIM, first);
         self.d_states.span_mut(&(0..first)).fill(Lanes::default());
-        self.gradient.resize(policy.net.params().len(), 0.0);
         self.d_log_std = [0.0; JOINTS];
         self.loss = 0.0;
         let demo_row = |i: usize| batch.rows[self.segments[i].start];

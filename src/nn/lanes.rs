@@ -103,6 +103,11 @@ pub struct Panels {
 }
 
 impl Panels {
+    /// Sees to it that [`Panels::reserve`] for at most `panels` panels of this width does not allocate.
+    pub fn provide(&mut self, width: usize, panels: usize) {
+        self.data.reserve((width * panels).saturating_sub(self.data.len()));
+    }
+
     /// Room for `panels` panels of this width, all 0 where it is new; keeps what is there and never shrinks under one width.
     pub fn reserve(&mut self, width: usize, panels: usize) {
         if self.width != width {

@@ -21,6 +21,17 @@ pub struct Mlp {
 /// Panels that go through all layers before the next do: two layers of them fit into a core's first cache, beside the weights.
 const STEP_PANELS: usize = 2;
 
+/// Panels in steps: the last is of three where one panel would be left alone, which a product is slow on.
+fn steps(panels: Range<usize>) -> impl Iterator<Item = Range<usize>> {
+    let mut from = panels.start;
+    std::iter::from_fn(move || {
+        let left = panels.end - from;
+        let size = if left == STEP_PANELS + 1 { left } else { left.min(STEP_PANELS) };
+        from += size;
+        (size > 0).then(|| from - size..from)
+    })
+}
+
 /// A range in blocks of `size`.
 pub fn blocks(panels: Range<usize>, size: usize) -> impl Iterator<Item = Range<usize>> {
     let end = panels.end;
@@ -123,7 +134,7 @@ impl Mlp {
 
     /// `pass.output` of these panels from `pass.input`.
     pub fn forward(&self, pass: &mut Pass, panels: Range<usize>) {
-        blocks(panels, STEP_PANELS).for_each(|block| self.forward_block(pass, &block));
+        steps(panels).for_each(|block| self.forward_block(pass, &block));
     }
 
     fn forward_block(&self, pass: &mut Pass, panels: &Range<usize>) {
@@ -141,7 +152,7 @@ impl Mlp {
 
     /// Gradients of the hidden layers of these panels from `pass.d_output`; they stay in the workspace for the two calls below.
     pub fn backward(&self, pass: &mut Pass, panels: Range<usize>) {
-        blocks(panels, STEP_PANELS).for_each(|block| self.backward_block(pass, &block));
+        steps(panels).for_each(|block| self.backward_block(pass, &block));
     }
 
     fn backward_block(&self, pass: &mut Pass, panels: &Range<usize>) {

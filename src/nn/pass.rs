@@ -32,6 +32,18 @@ impl Pass {
         pass
     }
 
+    /// Sees to it that [`Pass::reserve`] for at most `panels` panels does not allocate, nor the gradient.
+    pub fn provide(&mut self, mlp: &Mlp, panels: usize) {
+        self.reserve(mlp, 0);
+        for (i, width) in mlp.widths()[1..mlp.layers()].iter().enumerate() {
+            self.hidden[i].provide(*width, panels);
+            self.d_hidden[i].provide(*width, panels);
+        }
+        [&mut self.input, &mut self.d_input].map(|array| array.provide(mlp.inputs(), panels));
+        [&mut self.output, &mut self.d_output].map(|array| array.provide(mlp.outputs(), panels));
+        self.sums.begin(mlp.widths());
+    }
+
     /// Makes room for `panels` panels; keeps what is there and never shrinks.
     pub fn reserve(&mut self, mlp: &Mlp, panels: usize) {
         let hidden = &mlp.widths()[1..mlp.layers()];
@@ -52,7 +64,7 @@ impl Pass {
 /// the weight of one more input, which is always 1.
 #[derive(Clone, Debug, Default)]
 pub(super) struct GradientSums {
-    /// Samples with inputs for lanes: \[(inputs + 1) / 8\]\[samples\], in as much of it as they need.
+    /// Samples with inputs for lanes: \[(inputs + 1) / 8\]\[samples\], in as much of it as a layer needs.
     x: Vec<Lanes>,
     /// Sums so far, layer by layer: \[(inputs + 1) / 8\]\[outputs\].
     layers: Vec<Vec<Lanes>>,
@@ -67,16 +79,16 @@ impl GradientSums {
         for (sums, pair) in self.layers.iter_mut().zip(widths.windows(2)) {
             sums.resize(panels_of(pair[0] + 1) * pair[1], Lanes::default());
         }
+        let inputs = widths[..widths.len() - 1].iter().max().copied().unwrap_or(0);
+        self.x.resize(panels_of(inputs + 1) * BLOCK_PANELS * LANES, Lanes::default());
         self.fresh.clear();
         self.fresh.resize(widths.len() - 1, true);
     }
 
-    /// Adds x^T dy to a layer's sums, from panels of `inputs` and of `outputs` entries.
+    /// Adds x^T dy to a layer's sums, from at most [`BLOCK_PANELS`] panels of `inputs` and of `outputs` entries.
     pub fn add(&mut self, layer: usize, x: &[Lanes], inputs: usize, dy: &[Lanes], outputs: usize) {
         let depth = x.len() / inputs * LANES;
-        let needed = panels_of(inputs + 1) * depth;
-        self.x.resize(needed.max(self.x.len()), Lanes::default());
-        let turned = &mut self.x[..needed];
+        let turned = &mut self.x[..panels_of(inputs + 1) * depth];
         transpose(turned, x, inputs);
         let start = if std::mem::replace(&mut self.fresh[layer], false) { Start::Zero } else { Start::Result };
         let of = Product { x: turned, depth, a: Coefficients::Samples(dy), start, finish: Finish::Nothing };

@@ -54,13 +54,16 @@ pub unsafe fn tanh_all<T: Vector>(y: &mut [Lanes]) {
 pub unsafe fn transpose<T: Vector>(to: &mut [Lanes], from: &[Lanes], entries: usize) {
     let samples = from.len() / entries * LANES;
     for (p, panel) in from.chunks_exact(entries).enumerate() {
-        for (i, to) in to.chunks_exact_mut(samples).enumerate() {
+        let (whole, rest) = panel.as_chunks::<LANES>();
+        let mut last = [Lanes::default(); LANES];
+        last[..rest.len()].copy_from_slice(rest);
+        last[rest.len()] = Lanes::splat(1.0);
+        for (square, to) in whole.iter().chain([&last]).zip(to.chunks_exact_mut(samples)) {
+            let to = &mut to[p * LANES..(p + 1) * LANES];
             // SAFETY: all are borrowed; the rest is the caller's.
             unsafe {
-                let part = &panel[i * LANES..entries.min((i + 1) * LANES)];
-                let load = |k: usize| part.get(k).map_or(T::splat(if k == part.len() { 1.0 } else { 0.0 }), |at| T::load(at));
-                let turned = T::transposed(std::array::from_fn(load));
-                to[p * LANES..].iter_mut().zip(turned).for_each(|(to, v)| v.store(to));
+                let turned = T::transposed(std::array::from_fn(|k| T::load(&square[k])));
+                to.iter_mut().zip(turned).for_each(|(to, v)| v.store(to));
             }
         }
     }

@@ -1,6 +1,6 @@
 //! The kernels of every path against plain loops.
 
-use super::tiles::runs;
+use super::tiles::{runs, spans};
 use super::*;
 use std::cmp::Ordering;
 
@@ -152,5 +152,10 @@ fn runs_cover_a_range_evenly() {
         let parts: Vec<usize> = runs(n, most).flat_map(|(size, count)| std::iter::repeat_n(size, count)).collect();
         assert_eq!((parts.iter().sum::<usize>(), parts.len()), (n, n.div_ceil(most)));
         assert!(parts.iter().all(|size| *size <= most && size + 1 >= n.div_ceil(n.div_ceil(most).max(1))));
+    }
+    for panels in 0..9 {
+        let parts: Vec<usize> = spans(panels).flat_map(|(size, times)| std::iter::repeat_n(size, times)).collect();
+        assert_eq!(parts.iter().sum::<usize>(), panels);
+        assert!(parts.iter().all(|size| *size == 2 || *size == 3 || panels == 1));
     }
 }

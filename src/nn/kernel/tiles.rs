@@ -5,10 +5,9 @@ use super::entries::{tanh, tanh_slope};
 use super::vector::Vector;
 use super::{Coefficients, Finish, Product, Start};
 
-/// Panels of results and panels that a register tile spans, and the most entries it can then span: 12 sums of 8 lanes leave four of 16
-/// registers for operands and hide the latency of FMA (at least 8 are needed). A single panel is bound by loads, whatever it spans.
-const TILE_PANELS: usize = 2;
-const TILE_ENTRIES: [usize; TILE_PANELS + 1] = [0, 10, 6];
+/// The most entries that a register tile of 1, 2 or 3 panels spans: at most 12 sums of 8 lanes, which leave four of 16 registers for
+/// operands, and at least 8, which hide the latency of FMA. A single panel is bound by loads, whatever it spans.
+const TILE_ENTRIES: [usize; 4] = [0, 10, 6, 3];
 
 /// The addresses of one register tile.
 #[derive(Clone, Copy)]
@@ -50,7 +49,7 @@ enum TileFinish {
 #[inline(always)]
 pub unsafe fn product<T: Vector>(result: &mut [Lanes], width: usize, of: &Product) {
     let mut p = 0;
-    for (panels, times) in runs(of.x.len() / of.depth, TILE_PANELS) {
+    for (panels, times) in spans(of.x.len() / of.depth) {
         for _ in 0..times {
             let mut f = 0;
             for (entries, count) in runs(width, TILE_ENTRIES[panels]) {
@@ -69,6 +68,17 @@ pub unsafe fn product<T: Vector>(result: &mut [Lanes], width: usize, of: &Produc
             p += panels;
         }
     }
+}
+
+/// Panels of a tile, and how many times: two at a time, and three where one would be left alone.
+#[inline(always)]
+pub fn spans(panels: usize) -> impl Iterator<Item = (usize, usize)> {
+    let (pairs, rest) = match (panels / 2, panels % 2) {
+        (0, rest) => (0, rest),
+        (pairs, 1) => (pairs - 1, 3),
+        (pairs, _) => (pairs, 0),
+    };
+    [(2, pairs), (rest, usize::from(rest > 0))].into_iter().filter(|(_, times)| *times > 0)
 }
 
 /// n as the fewest parts of at most `most`, as even as can be: sizes, and how many parts have them.
@@ -160,19 +170,32 @@ unsafe fn sums<T: Vector, const S: usize, const P: usize, const F: usize>(tile: 
         for _ in 0..tile.blocks {
             let mut a = block;
             for _ in 0..tile.inner {
-                let samples: [T; P] = std::array::from_fn(|p| T::load(x.wrapping_add(p * tile.depth)));
-                for (f, sums) in sums.iter_mut().enumerate() {
-                    let a = T::splat(*a.add(f * S));
-                    for (sum, sample) in sums.iter_mut().zip(samples) {
-                        *sum = sample.times_plus(a, *sum);
-                    }
-                }
-                a = a.wrapping_add(tile.between_k);
-                x = x.wrapping_add(1);
+                step::<T, S, P, F>(&mut sums, a, x, tile.depth);
+                (a, x) = (a.wrapping_add(tile.between_k), x.wrapping_add(1));
             }
             block = block.wrapping_add(tile.between_blocks);
         }
         sums
+    }
+}
+
+/// Adds one k to the sums: its coefficients begin at `a`, its samples at `x`.
+#[inline(always)]
+unsafe fn step<T: Vector, const S: usize, const P: usize, const F: usize>(
+    sums: &mut [[T; P]; F],
+    a: *const f32,
+    x: *const Lanes,
+    depth: usize,
+) {
+    // SAFETY: the caller's.
+    unsafe {
+        let samples: [T; P] = std::array::from_fn(|p| T::load(x.wrapping_add(p * depth)));
+        for (f, sums) in sums.iter_mut().enumerate() {
+            let a = T::splat(*a.add(f * S));
+            for (sum, sample) in sums.iter_mut().zip(samples) {
+                *sum = sample.times_plus(a, *sum);
+            }
+        }
     }
 }
 
@@ -227,7 +250,10 @@ pub unsafe fn any_tiles<T: Vector, const S: usize>(panels: usize, entries: usize
             (2, 4) => tiles::<T, S, 2, 4>(count, first),
             (2, 5) => tiles::<T, S, 2, 5>(count, first),
             (2, 6) => tiles::<T, S, 2, 6>(count, first),
-            _ => unreachable!("tiles span 1 or 2 panels, and no more entries than registers hold"),
+            (3, 1) => tiles::<T, S, 3, 1>(count, first),
+            (3, 2) => tiles::<T, S, 3, 2>(count, first),
+            (3, 3) => tiles::<T, S, 3, 3>(count, first),
+            _ => unreachable!("tiles span 1 to 3 panels, and no more entries than registers hold"),
         }
     }
 }
