@@ -78,7 +78,7 @@ impl Rollout {
         self.states.provide(dynamics.task().state_dim(), panels);
         self.predictions.provide(BASE_DIM, panels);
         self.d_states.provide(BASE_DIM, first);
-        [&mut self.actions, &mut self.noise, &mut self.d_first].map(|array| array.provide(JOINTS, first));
+        [&mut self.actions, &mut self.noise, &mut self.d_first].into_iter().for_each(|array| array.provide(JOINTS, first));
         self.hands.reserve(panels.saturating_sub(self.hands.len()));
         self.segments.clear();
         self.segments.reserve(rows);

@@ -39,8 +39,10 @@ impl Pass {
             self.hidden[i].provide(*width, panels);
             self.d_hidden[i].provide(*width, panels);
         }
-        [&mut self.input, &mut self.d_input].map(|array| array.provide(mlp.inputs(), panels));
-        [&mut self.output, &mut self.d_output].map(|array| array.provide(mlp.outputs(), panels));
+        self.input.provide(mlp.inputs(), panels);
+        self.d_input.provide(mlp.inputs(), panels);
+        self.output.provide(mlp.outputs(), panels);
+        self.d_output.provide(mlp.outputs(), panels);
         self.sums.begin(mlp.widths());
     }
 
