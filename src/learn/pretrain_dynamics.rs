@@ -113,10 +113,10 @@ impl<'a> Batches<'a> {
     /// The batches of one epoch, in random order.
     pub fn shuffled(&self, rng: &mut impl rand::Rng) -> Epoch {
         let transitions = self.corpus.rows();
-        if self.rows > 0 {
+        if let Some(count) = transitions.checked_div(self.rows) {
             let mut rows: Vec<usize> = (0..transitions).collect();
             rows.shuffle(rng);
-            return Epoch { rows, ends: (1..=transitions / self.rows).map(|i| i * self.rows).collect() };
+            return Epoch { rows, ends: (1..=count).map(|i| i * self.rows).collect() };
         }
         let mut order: Vec<usize> = (0..self.corpus.demos()).collect();
         order.shuffle(rng);
