@@ -123,7 +123,8 @@ fn updates(criterion: &mut Criterion) {
         let mut group = criterion.benchmark_group("hil_update");
         for size in [1, 16, 32] {
             let demos: Vec<usize> = (0..size).collect();
-            let rows = learner.rows_of(&demos);
+            let mut rows = Vec::new();
+            learner.rows_of(&demos, &mut rows);
             pool.install(|| {
                 report(&format!("hil_update/B{size}"), threads, peak, || {
                     hil_update(&mut learner, &demos, &rows);

@@ -82,10 +82,8 @@ pub fn behavior_cloning(policy: &Policy, batch: Batch, choices: &Choices, rng: &
         let part = shards::range(rows, shards::count(rows), i);
         let panels = panels_of(part.len());
         shard.pass.reserve(&policy.net, panels);
-        for (slot, r) in part.clone().enumerate() {
-            shard.pass.input.write_row(slot, row(&batch.samples.inputs, policy.net.inputs(), batch.rows[r]));
-        }
-        shard.pass.input.clear_tail(part.len());
+        let inputs = |slot: usize| row(&batch.samples.inputs, policy.net.inputs(), batch.rows[part.start + slot]);
+        shard.pass.input.write_rows(0, part.len(), inputs);
         policy.net.forward(&mut shard.pass, 0..panels);
         let eps = if samples { &noise[part.start * JOINTS..part.end * JOINTS] } else { &[] };
         shard.losses(policy, batch, &batch.rows[part], eps, choices);
@@ -98,6 +96,28 @@ pub fn draw_noise(wanted: bool, rows: usize, rng: &mut impl Rng, noise: &mut Vec
     noise.clear();
     if wanted {
         noise.extend((0..rows * JOINTS).map(|_| -> f32 { StandardNormal.sample(rng) }));
+    }
+}
+
+impl Workspace {
+    /// With room for batches of at most `most_rows` state-action pairs.
+    pub fn new(policy: &Policy, most_rows: usize) -> Self {
+        let rows = shards::most_rows(most_rows);
+        let shard = || {
+            let mut shard = Shard {
+                d_bc: Vec::with_capacity(rows * JOINTS),
+                gradient: vec![0.0; policy.net.params().len()],
+                ..Shard::default()
+            };
+            shard.pass.provide(&policy.net, panels_of(rows));
+            shard
+        };
+        Workspace {
+            shards: (0..shards::MAX_SHARDS).map(|_| shard()).collect(),
+            noise: Vec::with_capacity(most_rows * JOINTS),
+            mean: Vec::with_capacity(most_rows * JOINTS),
+            ..Workspace::default()
+        }
     }
 }
 
@@ -190,7 +210,6 @@ pub fn policy_gradient(
             policy.net.backward(&mut shard.pass, block.clone());
             policy.net.add_gradient(&mut shard.pass, block);
         }
-        shard.gradient.clear();
         shard.gradient.resize(policy.net.params().len(), 0.0);
         policy.net.finish_gradient(&shard.pass, &mut shard.gradient);
     });

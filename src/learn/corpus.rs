@@ -73,9 +73,16 @@ impl Corpus {
         self.starts[i]..self.starts[i + 1]
     }
 
-    /// Transitions of some demos, one after another.
-    pub fn rows_of(&self, demos: &[usize]) -> Vec<usize> {
-        demos.iter().flat_map(|i| self.demo(*i)).collect()
+    /// Transitions of the longest demo.
+    pub fn longest(&self) -> usize {
+        (0..self.demos()).map(|i| self.demo(i).len()).max().unwrap_or(0)
+    }
+
+    /// Transitions of some demos, one after another, into `rows`.
+    pub fn rows_of(&self, demos: &[usize], rows: &mut Vec<usize>) {
+        rows.clear();
+        rows.reserve(demos.len() * self.longest());
+        rows.extend(demos.iter().flat_map(|i| self.demo(*i)));
     }
 
     /// s_t of transition `r`.

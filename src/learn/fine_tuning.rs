@@ -2,7 +2,7 @@
 
 use super::corpus::{Corpus, Samples};
 use super::dynamics::Dynamics;
-use super::pretrain_dynamics::{model_loss, validation_loss};
+use super::pretrain_dynamics::{loss_weights, model_loss, validation_loss};
 use super::regression::Regression;
 use crate::nn::{Adam, clip_by_global_norm};
 
@@ -13,6 +13,7 @@ pub struct Model {
     /// Its inputs and targets on the training demos.
     pub samples: Samples,
     held_out: Samples,
+    weights: Vec<f32>,
     pub(super) adam: Adam,
     work: Regression,
 }
@@ -23,6 +24,7 @@ impl Model {
         Model {
             samples: corpus.model_samples(&dynamics),
             held_out: held_out.model_samples(&dynamics),
+            weights: loss_weights(&dynamics),
             adam: Adam::new(dynamics.net.params().len()),
             work: Regression::default(),
             dynamics,
@@ -31,8 +33,8 @@ impl Model {
 
     /// One update on transitions `rows` of the training demos; returns the loss before it and the norm of its gradient.
     pub fn fine_tune(&mut self, rows: &[usize], mean_length: f32, learning_rate: f64) -> (f64, f64) {
-        let Model { dynamics, samples, adam, work, .. } = self;
-        let loss = model_loss(dynamics, rows.len(), mean_length);
+        let Model { dynamics, samples, weights, adam, work, .. } = self;
+        let loss = model_loss(dynamics, weights, rows.len(), mean_length);
         let l_model = work.loss(&dynamics.net, samples, rows, &loss, true);
         let norm = clip_by_global_norm(&mut work.gradient, dynamics.settings().clip_norm);
         adam.step(&mut dynamics.net.params_mut(), &work.gradient, learning_rate);

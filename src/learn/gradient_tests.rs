@@ -26,14 +26,15 @@ struct World {
 
 fn world(task: Task, structure: Structure, settings: TrainSettings) -> World {
     let corpus = Corpus::new(&demos(task, 8, 20, 5), "training").expect("demos");
-    let mut rng = stream(2, "world", 0);
+    let (mut rng, mut rows) = (stream(2, "world", 0), Vec::new());
+    corpus.rows_of(&[6, 1, 3, 0, 5, 2, 4, 7], &mut rows);
     let policy = Policy::new(&corpus, &settings, &mut rng);
     let pretrain = PretrainSettings { structure, hidden_units: 16, features: settings.features, ..Default::default() };
     let dynamics = Dynamics::new(&corpus, &pretrain, &mut rng);
     World {
         samples: corpus.policy_samples(&policy),
         model_inputs: corpus.model_samples(&dynamics).inputs,
-        rows: corpus.rows_of(&[6, 1, 3, 0, 5, 2, 4, 7]),
+        rows,
         corpus,
         policy,
         dynamics,
@@ -269,7 +270,9 @@ fn step_by_step(world: &World, gradient: &mut [f32]) -> f64 {
         }
         policy.net.begin_gradient(&mut pi);
         policy.net.add_gradient(&mut pi, 0..steps);
-        policy.net.finish_gradient(&pi, gradient);
+        let mut of_demo = vec![0.0; gradient.len()];
+        policy.net.finish_gradient(&pi, &mut of_demo);
+        add_scaled(gradient, &of_demo, 1.0);
         at += steps;
     }
     l_sc

@@ -14,6 +14,7 @@ use crate::nn::cosine;
 use crate::seed::stream;
 use crate::table::Table;
 use rand::seq::SliceRandom;
+use serde::{Deserialize, Serialize};
 
 /// Which losses teach the policy.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -102,7 +103,7 @@ fn warm_start(run: &mut Run, settings: &TrainSettings) -> Result<()> {
             d_conv.add(cloned.d_conv);
         }
         (metrics.l_bc, metrics.l_mix, metrics.d_conv, metrics.alpha) = (l_bc.get(), l_bc.get(), d_conv.get(), 0.0);
-        run.end_epoch(metrics, None)?;
+        run.end_epoch(metrics, MixingState::default())?;
     }
     run.learner.end_stage();
     Ok(())
@@ -113,7 +114,8 @@ fn hybrid_imitation_learning(run: &mut Run, alpha: Alpha, settings: &TrainSettin
     let mut order: Vec<usize> = (0..run.learner.corpus.demos()).collect();
     let batch = settings.batch.min(order.len());
     let per_epoch = order.len().div_ceil(batch) as u64;
-    let mut mixing = Mixing { average: run.alpha_average(), ..Mixing::new(alpha, settings, per_epoch) };
+    let mut mixing = Mixing { state: run.mixing(), ..Mixing::new(alpha, settings, per_epoch) };
+    let mut rows = Vec::new();
     let done = run.enter(HIL);
     // Each epoch shuffles the order of the one before.
     (0..done).for_each(|past| order.shuffle(&mut stream(seed, "train.order", past)));
@@ -124,7 +126,7 @@ fn hybrid_imitation_learning(run: &mut Run, alpha: Alpha, settings: &TrainSettin
         for (i, demos) in order.chunks(batch).enumerate() {
             run.check()?;
             let learner = &mut run.learner;
-            let rows = learner.rows_of(demos);
+            learner.rows_of(demos, &mut rows);
             let cloned = learner.behavior_cloning(&rows, demos.len() as f64)?; // Algorithm 2, Eq. 3-4
             let alpha = mixing.weight(cloned.d_conv); // alpha_e = d_conv, no gradient through it
             let sc = if alpha > 0.0 { learner.state_cloning(demos, &rows)? } else { f64::NAN }; // Algorithm 3, Eq. 5
@@ -148,7 +150,7 @@ fn hybrid_imitation_learning(run: &mut Run, alpha: Alpha, settings: &TrainSettin
         }
         (metrics.l_bc, metrics.l_sc, metrics.l_mix) = (l_bc.get(), l_sc.get(), l_mix.get());
         (metrics.d_conv, metrics.alpha, metrics.l_model) = (d_conv.get(), alphas.get(), l_model.get());
-        run.end_epoch(metrics, mixing.average)?;
+        run.end_epoch(metrics, mixing.state)?;
     }
     run.learner.end_stage();
     Ok(())
@@ -160,10 +162,17 @@ struct Mixing {
     cap: f64,
     /// Share of the past in the average; 0 follows d_conv at once.
     keep: f64,
-    average: Option<f64>,
     /// Whether the gradient of L_SC is scaled to the length of that of L_BC.
     balance: bool,
-    /// Mean of the logarithm of the ratio of the two lengths, over the last epochs.
+    state: MixingState,
+}
+
+/// What the mixing remembers from update to update.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub(super) struct MixingState {
+    /// The average that an adaptive alpha follows.
+    average: Option<f64>,
+    /// Mean over the last epochs of ln(length of the gradient of L_BC / length of that of L_SC).
     log_ratio: Option<f64>,
 }
 
@@ -173,20 +182,20 @@ const RATIO_KEEP: f64 = 0.8;
 impl Mixing {
     fn new(alpha: Alpha, settings: &TrainSettings, updates_per_epoch: u64) -> Self {
         let keep = if settings.alpha_average { 1.0 - 1.0 / updates_per_epoch.max(1) as f64 } else { 0.0 };
-        Mixing { alpha, cap: settings.alpha_max, keep, average: None, balance: settings.sc_balance, log_ratio: None }
+        Mixing { alpha, cap: settings.alpha_max, keep, balance: settings.sc_balance, state: MixingState::default() }
     }
 
     /// Takes in the lengths of the gradients of L_BC and L_SC at an epoch's first update.
     fn see_norms(&mut self, bc: f64, sc: f64) {
         let now = (bc / sc).ln();
         if now.is_finite() {
-            self.log_ratio = Some(self.log_ratio.map_or(now, |past| RATIO_KEEP * past + (1.0 - RATIO_KEEP) * now));
+            self.state.log_ratio = Some(self.state.log_ratio.map_or(now, |past| RATIO_KEEP * past + (1.0 - RATIO_KEEP) * now));
         }
     }
 
     /// Factor of L_SC.
     fn sc_scale(&self) -> f64 {
-        if self.balance { self.log_ratio.map_or(1.0, f64::exp) } else { 1.0 }
+        if self.balance { self.state.log_ratio.map_or(1.0, f64::exp) } else { 1.0 }
     }
 
     fn weight(&mut self, d_conv: f64) -> f64 {
@@ -194,8 +203,8 @@ impl Mixing {
             Alpha::Fixed(alpha) => alpha,
             Alpha::Adaptive => {
                 let now = d_conv.clamp(0.0, 1.0);
-                let average = self.average.map_or(now, |past| self.keep * past + (1.0 - self.keep) * now);
-                self.average = Some(average);
+                let average = self.state.average.map_or(now, |past| self.keep * past + (1.0 - self.keep) * now);
+                self.state.average = Some(average);
                 average.min(self.cap)
             }
         }

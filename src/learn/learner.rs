@@ -14,6 +14,7 @@ use crate::demo::Demo;
 use crate::error::{Error, Result};
 use crate::nn::{Adam, Ema, clip_by_global_norm, gaussian, global_norm};
 use crate::seed::stream;
+use crate::state::JOINTS;
 
 /// A parameter vector's way down.
 pub(super) struct Descent {
@@ -86,6 +87,7 @@ impl Learner {
         }
         let policy = Policy::new(&corpus, settings, &mut stream(seed, "train.init", 0));
         let model = dynamics.map(|dynamics| Model::new(dynamics, &corpus, &held_out));
+        let most_rows = settings.bc_batch.max(settings.batch * corpus.longest()).min(corpus.rows());
         Ok(Learner {
             seed,
             updates: 0,
@@ -98,12 +100,12 @@ impl Learner {
             std_descent: Descent::new(&policy.log_std, settings.ema_decay),
             bc_choices: bc::Choices::new(settings),
             sc_choices: sc::Choices::new(settings, &corpus),
-            bc_work: bc::Workspace::default(),
+            bc_work: bc::Workspace::new(&policy, most_rows),
             sc_work: sc::Workspace::default(),
             validation_work: bc::Workspace::default(),
-            segments: Vec::new(),
-            sc_noise: Vec::new(),
-            pushes: Pushes::new(settings),
+            segments: Vec::with_capacity(most_rows),
+            sc_noise: Vec::with_capacity(most_rows * JOINTS),
+            pushes: Pushes::new(settings, most_rows),
             gradient: vec![0.0; policy.net.params().len()],
             draws: 0,
             settings: settings.clone(),
@@ -132,9 +134,9 @@ impl Learner {
         self.policy.log_std.copy_from_slice(self.std_descent.ema.average());
     }
 
-    /// Transitions of some training demos, one after another.
-    pub fn rows_of(&self, demos: &[usize]) -> Vec<usize> {
-        self.corpus.rows_of(demos)
+    /// Transitions of some training demos, one after another, into `rows`.
+    pub fn rows_of(&self, demos: &[usize], rows: &mut Vec<usize>) {
+        self.corpus.rows_of(demos, rows);
     }
 
     /// Segments of the last [`Learner::state_cloning`].

@@ -36,13 +36,14 @@ pub fn pretrain_dynamics(
     let mut adam = Adam::new(dynamics.net.params().len());
     let mut ema = Ema::new(dynamics.net.params(), settings.ema_decay);
     let (mut work, mut averaged, mut epochs, mut updates) = (Regression::default(), dynamics.clone(), Vec::new(), 0);
+    let weights = loss_weights(&dynamics);
     for epoch in 0..settings.epochs {
         let mut mean = Mean::default();
         let mut metrics = EpochMetrics::new("pretrain", epoch + 1, settings.epochs);
-        for rows in batches.shuffled(&mut stream(seed, "pretrain.order", epoch)) {
+        for rows in batches.shuffled(&mut stream(seed, "pretrain.order", epoch)).iter() {
             interrupt.check()?;
-            let loss = model_loss(&dynamics, rows.len(), corpus.rows() as f32 / corpus.demos() as f32);
-            let l_model = work.loss(&dynamics.net, &samples, &rows, &loss, true);
+            let loss = model_loss(&dynamics, &weights, rows.len(), corpus.rows() as f32 / corpus.demos() as f32);
+            let l_model = work.loss(&dynamics.net, &samples, rows, &loss, true);
             if !l_model.is_finite() {
                 let update = updates + 1;
                 return Err(Error::Failed(format!(
@@ -69,21 +70,27 @@ pub fn pretrain_dynamics(
 /// Loss on all of the validation transitions.
 pub(super) fn validation_loss(dynamics: &Dynamics, corpus: &Corpus, samples: &Samples, work: &mut Regression) -> f64 {
     let rows: Vec<usize> = (0..corpus.rows()).collect();
-    let loss = model_loss(dynamics, rows.len(), corpus.rows() as f32 / corpus.demos() as f32);
+    let weights = loss_weights(dynamics);
+    let loss = model_loss(dynamics, &weights, rows.len(), corpus.rows() as f32 / corpus.demos() as f32);
     work.loss(&dynamics.net, samples, &rows, &loss, false)
 }
 
-/// Eq. 6 for a batch of `rows` transitions; a demo has `mean_length` on average.
-pub(super) fn model_loss(dynamics: &Dynamics, rows: usize, mean_length: f32) -> Loss {
-    let kind = dynamics.settings().loss;
-    let huber = kind == ModelLoss::StandardisedHuber;
-    match kind {
-        ModelLoss::RawSum => {
-            let weights = dynamics.residual_scaling().std.iter().map(|s| s * s).collect();
-            Loss { weights, scale: mean_length / rows as f32, huber }
-        }
-        _ => Loss { weights: vec![1.0; BASE_DIM], scale: 1.0 / (rows * BASE_DIM) as f32, huber },
+/// The weight of each entry in Eq. 6.
+pub(super) fn loss_weights(dynamics: &Dynamics) -> Vec<f32> {
+    match dynamics.settings().loss {
+        ModelLoss::RawSum => dynamics.residual_scaling().std.iter().map(|s| s * s).collect(),
+        _ => vec![1.0; BASE_DIM],
     }
+}
+
+/// Eq. 6 for a batch of `rows` transitions with [`loss_weights`]; a demo has `mean_length` on average.
+pub(super) fn model_loss<'a>(dynamics: &Dynamics, weights: &'a [f32], rows: usize, mean_length: f32) -> Loss<'a> {
+    let kind = dynamics.settings().loss;
+    let scale = match kind {
+        ModelLoss::RawSum => mean_length / rows as f32,
+        _ => 1.0 / (rows * BASE_DIM) as f32,
+    };
+    Loss { weights, scale, huber: kind == ModelLoss::StandardisedHuber }
 }
 
 /// How an epoch is cut into updates.
@@ -104,14 +111,34 @@ impl<'a> Batches<'a> {
     }
 
     /// The batches of one epoch, in random order.
-    pub fn shuffled(&self, rng: &mut impl rand::Rng) -> Vec<Vec<usize>> {
-        if self.rows == 0 {
-            let mut order: Vec<usize> = (0..self.corpus.demos()).collect();
-            order.shuffle(rng);
-            return order.into_iter().map(|i| self.corpus.demo(i).collect()).collect();
+    pub fn shuffled(&self, rng: &mut impl rand::Rng) -> Epoch {
+        let transitions = self.corpus.rows();
+        if let Some(count) = transitions.checked_div(self.rows) {
+            let mut rows: Vec<usize> = (0..transitions).collect();
+            rows.shuffle(rng);
+            return Epoch { rows, ends: (1..=count).map(|i| i * self.rows).collect() };
         }
-        let mut order: Vec<usize> = (0..self.corpus.rows()).collect();
+        let mut order: Vec<usize> = (0..self.corpus.demos()).collect();
         order.shuffle(rng);
-        order.chunks_exact(self.rows).map(<[usize]>::to_vec).collect()
+        let mut epoch = Epoch { rows: Vec::with_capacity(transitions), ends: Vec::with_capacity(order.len()) };
+        for demo in order {
+            epoch.rows.extend(self.corpus.demo(demo));
+            epoch.ends.push(epoch.rows.len());
+        }
+        epoch
+    }
+}
+
+/// The batches of one epoch side by side.
+pub(super) struct Epoch {
+    rows: Vec<usize>,
+    ends: Vec<usize>,
+}
+
+impl Epoch {
+    /// The transitions of each batch.
+    pub fn iter(&self) -> impl Iterator<Item = &[usize]> {
+        let starts = [0].into_iter().chain(self.ends.iter().copied());
+        starts.zip(&self.ends).map(|(start, end)| &self.rows[start..*end])
     }
 }

@@ -13,8 +13,8 @@ pub struct Pushes {
 }
 
 impl Pushes {
-    /// As the settings say.
-    pub fn new(settings: &TrainSettings) -> Self {
+    /// As the settings say, with room for `most_rows` transitions.
+    pub fn new(settings: &TrainSettings, most_rows: usize) -> Self {
         Pushes { sigma_rad_s: settings.sc_noise_variance.sqrt() as f32, pulses: settings.sc_pulses.clone(), rows: Vec::new() }
     }
 

@@ -2,17 +2,17 @@
 
 use super::corpus::{Samples, row};
 use super::shards;
-use crate::nn::{BLOCK_PANELS, LANES, Lanes, Mlp, Pass, panels_of};
+use crate::nn::{BLOCK_PANELS, LANES, Lanes, Mlp, Pass, kernel, panels_of};
 use rayon::prelude::*;
 
 /// Where Huber's function turns from a parabola into a line, in standard deviations.
 const HUBER_KNEE: f32 = 1.0;
 
 /// sum over rows and entries of scale * weight_i * loss(error_i).
-#[derive(Clone, Debug)]
-pub struct Loss {
+#[derive(Clone, Copy, Debug)]
+pub struct Loss<'a> {
     /// Weight of each entry.
-    pub weights: Vec<f32>,
+    pub weights: &'a [f32],
     /// Factor of the sum.
     pub scale: f32,
     /// Huber's function instead of the square.
@@ -38,7 +38,8 @@ impl Regression {
     /// Loss of the network on `rows` of `samples`; with `learn`, its gradient too.
     pub fn loss(&mut self, net: &Mlp, samples: &Samples, rows: &[usize], loss: &Loss, learn: bool) -> f64 {
         let active = shards::count(rows.len());
-        self.shards.resize_with(active.max(self.shards.len()), Shard::default);
+        self.shards.resize_with(shards::MAX_SHARDS, Shard::default);
+        self.shards.iter_mut().for_each(|shard| shard.reserve(net));
         self.shards[..active].par_iter_mut().enumerate().for_each(|(i, shard)| {
             shard.run(net, samples, &rows[shards::range(rows.len(), active, i)], loss, learn);
         });
@@ -56,26 +57,26 @@ impl Regression {
 }
 
 impl Shard {
-    fn run(&mut self, net: &Mlp, samples: &Samples, rows: &[usize], loss: &Loss, learn: bool) {
+    fn reserve(&mut self, net: &Mlp) {
+        self.pass.provide(net, BLOCK_PANELS);
         self.pass.reserve(net, BLOCK_PANELS);
+        self.gradient.resize(net.params().len(), 0.0);
+    }
+
+    fn run(&mut self, net: &Mlp, samples: &Samples, rows: &[usize], loss: &Loss, learn: bool) {
         self.loss = 0.0;
         net.begin_gradient(&mut self.pass);
         for rows in rows.chunks(BLOCK_PANELS * LANES) {
             self.block(net, samples, rows, loss, learn);
         }
         if learn {
-            self.gradient.clear();
-            self.gradient.resize(net.params().len(), 0.0);
             net.finish_gradient(&self.pass, &mut self.gradient);
         }
     }
 
     fn block(&mut self, net: &Mlp, samples: &Samples, rows: &[usize], loss: &Loss, learn: bool) {
         let panels = panels_of(rows.len());
-        for (slot, r) in rows.iter().enumerate() {
-            self.pass.input.write_row(slot, row(&samples.inputs, net.inputs(), *r));
-        }
-        self.pass.input.clear_tail(rows.len());
+        self.pass.input.write_rows(0, rows.len(), |slot| row(&samples.inputs, net.inputs(), rows[slot]));
         net.forward(&mut self.pass, 0..panels);
         for (p, rows) in rows.chunks(LANES).enumerate() {
             self.panel_loss(samples, p, rows, loss);
@@ -89,13 +90,13 @@ impl Shard {
     /// Loss of one panel, and its gradient; lanes without a row have no error.
     fn panel_loss(&mut self, samples: &Samples, p: usize, rows: &[usize], loss: &Loss) {
         let (output, d_output) = (self.pass.output.panel(p), self.pass.d_output.panel_mut(p));
-        d_output.copy_from_slice(output);
-        for (lane, r) in rows.iter().enumerate() {
-            let target = row(&samples.targets, output.len(), *r);
-            d_output.iter_mut().zip(target).for_each(|(slot, value)| slot.0[lane] = *value);
+        let target = |lane: usize| row(&samples.targets, output.len(), rows[lane.min(rows.len() - 1)]);
+        kernel::interleave(d_output, std::array::from_fn(target));
+        for (target, output) in d_output.iter_mut().zip(output) {
+            target.0[rows.len()..].copy_from_slice(&output.0[rows.len()..]);
         }
         let mut sum = Lanes::default();
-        for ((d, output), weight) in d_output.iter_mut().zip(output).zip(&loss.weights) {
+        for ((d, output), weight) in d_output.iter_mut().zip(output).zip(loss.weights) {
             let error = *output - *d;
             // Huber's function is a parabola up to the knee, and a line from there
             let knee = if loss.huber { HUBER_KNEE } else { f32::INFINITY };
@@ -130,7 +131,7 @@ mod tests {
         let samples = Samples { inputs: random(200 * 3, 2.0), targets: random(200 * 2, 6.0) };
         let rows: Vec<usize> = (0..200).collect();
         for huber in [false, true] {
-            let loss = Loss { weights: vec![1.0, 0.5], scale: 1.0 / 400.0, huber };
+            let loss = Loss { weights: &[1.0, 0.5], scale: 1.0 / 400.0, huber };
             let mut work = Regression::default();
             work.loss(&net, &samples, &rows, &loss, true);
             let gradient = work.gradient.clone();

@@ -10,7 +10,7 @@ use super::hand::Hand;
 use super::policy::Policy;
 use super::state_cloning::{Batch, Choices, Segment};
 use crate::config::{ActionChoice, Structure};
-use crate::nn::{LANES, Lanes, Panels, Pass, panels_of};
+use crate::nn::{LANES, Lanes, Panels, Pass, kernel, panels_of};
 use crate::state::{BASE_DIM, JOINTS};
 use std::ops::Range;
 
@@ -72,10 +72,27 @@ impl Depth {
 }
 
 impl Rollout {
-    /// Takes in segments, sorted by length, longest first.
-    pub fn deal<'a>(&mut self, segments: impl Iterator<Item = &'a Segment>) {
+    /// Allocates for any segments of `rows` transitions, none of more than `longest` steps.
+    pub fn provide(&mut self, policy: &Policy, dynamics: &Dynamics, rows: usize, longest: usize) {
+        let (first, panels) = (panels_of(rows), panels_of(rows) + longest); // each depth may leave one panel half empty
+        self.policy.provide(&policy.net, panels);
+        self.model.provide(&dynamics.net, panels);
+        self.states.provide(dynamics.task().state_dim(), panels);
+        self.predictions.provide(BASE_DIM, panels);
+        self.d_states.provide(BASE_DIM, first);
+        [&mut self.actions, &mut self.noise, &mut self.d_first].into_iter().for_each(|array| array.provide(JOINTS, first));
+        self.hands.reserve(panels.saturating_sub(self.hands.len()));
         self.segments.clear();
-        self.segments.extend(segments);
+        self.segments.reserve(rows);
+        self.counts.clear();
+        self.counts.reserve(longest);
+        self.gradient.resize(policy.net.params().len(), 0.0);
+    }
+
+    /// Takes in segments, sorted by length, longest first.
+    pub fn deal(&mut self, segments: &[Segment]) {
+        self.segments.clear();
+        self.segments.extend_from_slice(segments);
         self.counts.clear();
         self.counts.resize(self.segments.first().map_or(0, |s| s.steps), 0);
         for segment in &self.segments {
@@ -118,17 +135,12 @@ impl Rollout {
         }
         self.d_states.reserve(BASE_DIM, first);
         self.d_states.span_mut(&(0..first)).fill(Lanes::default());
-        self.gradient.clear();
-        self.gradient.resize(policy.net.params().len(), 0.0);
         self.d_log_std = [0.0; JOINTS];
         self.loss = 0.0;
-        for (i, segment) in self.segments.iter().enumerate() {
-            let demo_row = batch.rows[segment.start];
-            self.states.write_row(i, batch.corpus.state(demo_row));
-            self.model.input.write_row(i, &row(batch.model_inputs, dynamics.inputs(), demo_row)[..dynamics.features().width()]);
-        }
-        self.states.clear_tail(self.segments.len());
-        self.model.input.clear_tail(self.segments.len());
+        let demo_row = |i: usize| batch.rows[self.segments[i].start];
+        self.states.write_rows(0, self.segments.len(), |i| batch.corpus.state(demo_row(i)));
+        let inputs = |i: usize| row(batch.model_inputs, dynamics.inputs(), demo_row(i));
+        self.model.input.write_rows(0, self.segments.len(), inputs);
     }
 
     /// One step forward: a_t from the policy, s_{t+1} from the dynamics network.
@@ -227,11 +239,11 @@ impl Rollout {
     /// Adds the loss of panel `p` of this depth and its gradient with respect to the predictions, and hands that to the dynamics network.
     fn add_loss(&mut self, depth: Depth, p: usize, at: usize, dynamics: &Dynamics, batch: Batch, choices: &Choices) {
         let scale = choices.scale(batch.rows.len(), batch.demos);
-        let mut targets = [Lanes::default(); BASE_DIM];
-        targets.copy_from_slice(self.predictions.panel(at)); // no error where there is no segment
-        for (lane, i) in depth.segments(p).enumerate() {
-            let target = row(&batch.corpus.next, BASE_DIM, batch.rows[self.segments[i].start + depth.j]);
-            targets.iter_mut().zip(target).for_each(|(slot, value)| slot.0[lane] = *value);
+        let (segments, mut targets) = (depth.segments(p), [Lanes::default(); BASE_DIM]);
+        let target = |i: usize| row(&batch.corpus.next, BASE_DIM, batch.rows[self.segments[i].start + depth.j]);
+        kernel::interleave(&mut targets, std::array::from_fn(|lane| target((segments.start + lane).min(segments.end - 1))));
+        for (target, prediction) in targets.iter_mut().zip(self.predictions.panel(at)) {
+            target.0[segments.len()..].copy_from_slice(&prediction.0[segments.len()..]); // no error where there is no segment
         }
         let (d_state, d_output) = (self.d_states.panel_mut(p), self.model.d_output.panel_mut(at));
         let mut loss = Lanes::default();

@@ -14,6 +14,11 @@ pub fn count(rows: usize) -> usize {
     (rows / MIN_ROWS).clamp(1, MAX_SHARDS)
 }
 
+/// Most rows that a shard of at most `rows` rows has.
+pub fn most_rows(rows: usize) -> usize {
+    rows.div_ceil(MAX_SHARDS).max(rows.min(2 * MIN_ROWS))
+}
+
 /// The rows of shard `i` of `count`.
 pub fn range(rows: usize, count: usize, i: usize) -> Range<usize> {
     rows * i / count..rows * (i + 1) / count
@@ -34,6 +39,7 @@ mod tests {
             let n = count(rows);
             let covered: Vec<usize> = (0..n).flat_map(|i| range(rows, n, i)).collect();
             assert_eq!(covered, (0..rows).collect::<Vec<_>>());
+            assert!((0..n).all(|i| range(rows, n, i).len() <= most_rows(rows) && most_rows(rows) <= most_rows(rows + 1)));
         }
     }
 }

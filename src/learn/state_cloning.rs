@@ -151,17 +151,37 @@ pub fn state_cloning(
     choices: &Choices,
     work: &mut Workspace,
 ) -> f64 {
+    let (longest, most_rows) = (batch.corpus.longest(), batch.demos * batch.corpus.longest());
     work.sorted.clear();
+    work.sorted.reserve(most_rows);
+    work.d_first.clear();
+    work.d_first.reserve(most_rows * JOINTS);
     work.sorted.extend_from_slice(segments);
     work.sorted.sort_unstable_by_key(|s| (std::cmp::Reverse(s.steps), s.start));
     work.active = shards::count(batch.rows.len()).min(shards::MAX_SEGMENT_SHARDS);
-    work.rollouts.resize_with(work.active.max(work.rollouts.len()), Rollout::default);
+    work.rollouts.resize_with(shards::MAX_SEGMENT_SHARDS, Rollout::default);
+    work.rollouts.iter_mut().for_each(|rollout| rollout.provide(policy, dynamics, most_rows, longest));
     let (active, sorted) = (work.active, &work.sorted);
     work.rollouts[..active].par_iter_mut().enumerate().for_each(|(i, rollout)| {
-        rollout.deal(sorted.iter().skip(i).step_by(active));
+        rollout.deal(share(sorted, active, i));
         rollout.run(policy, dynamics, batch, choices);
     });
     work.collect(policy.net.params().len(), batch.rows.len())
+}
+
+/// Shard `i` of `count`: as much work as the others have. Long segments stay together, so that few panels are half empty.
+fn share(sorted: &[Segment], count: usize, i: usize) -> &[Segment] {
+    let work = |s: &Segment| 2 * s.steps - 1; // the first step needs only the dynamics network
+    let total: usize = sorted.iter().map(work).sum();
+    let cut = |i: usize| {
+        let mut before = 0;
+        let place = sorted.iter().position(|s| {
+            before += work(s);
+            before - work(s) >= total * i / count
+        });
+        if i < count { place.unwrap_or(sorted.len()) } else { sorted.len() }
+    };
+    &sorted[cut(i)..cut(i + 1)]
 }
 
 impl Workspace {
@@ -191,6 +211,18 @@ mod tests {
         let mut out = Vec::new();
         draw_segments([50, 3].into_iter(), rho, pairs, &mut stream(0, "coins", 0), &mut out);
         out
+    }
+
+    #[test]
+    fn shares_cover_the_segments_and_are_alike() {
+        let sorted: Vec<Segment> = (0..90).map(|i| Segment { start: i, steps: 1 + (90 - i) / 9 }).collect();
+        for count in 1..4 {
+            let shares: Vec<&[Segment]> = (0..count).map(|i| share(&sorted, count, i)).collect();
+            assert_eq!(shares.concat(), sorted);
+            let work = |i: usize| shares[i].iter().map(|s| 2 * s.steps - 1).sum::<usize>();
+            assert!((1..count).all(|i| work(i).abs_diff(work(0)) < 40));
+        }
+        assert!(share(&[], 2, 0).is_empty() && share(&[], 2, 1).is_empty());
     }
 
     #[test]

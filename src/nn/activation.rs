@@ -1,6 +1,6 @@
-//! Activations, entry by entry.
+//! Activations, entry by entry: what a product of a hidden layer ends with.
 
-use super::kernel;
+use super::kernel::Finish;
 use super::lanes::Lanes;
 use serde::{Deserialize, Serialize};
 
@@ -15,19 +15,19 @@ pub enum Activation {
 }
 
 impl Activation {
-    /// y <- activation(y), in place.
-    pub fn forward(self, y: &mut [Lanes]) {
+    /// y = activation(x), x being the product.
+    pub fn forward(self) -> Finish<'static> {
         match self {
-            Activation::Tanh => kernel::tanh(y),
-            Activation::Relu => y.iter_mut().for_each(|y| *y = y.map(|v| if v > 0.0 { v } else { v * 0.0 })),
+            Activation::Tanh => Finish::Tanh,
+            Activation::Relu => Finish::Relu,
         }
     }
 
-    /// d <- d * activation'(x), from the activation's output y.
-    pub fn backward(self, d: &mut [Lanes], y: &[Lanes]) {
+    /// d * activation'(x), d being the product and y the activation's output.
+    pub fn backward(self, y: &[Lanes]) -> Finish<'_> {
         match self {
-            Activation::Tanh => kernel::tanh_backward(d, y),
-            Activation::Relu => d.iter_mut().zip(y).for_each(|(d, y)| *d = *d * y.map(|y| if y > 0.0 { 1.0 } else { 0.0 })),
+            Activation::Tanh => Finish::TanhSlope(y),
+            Activation::Relu => Finish::ReluSlope(y),
         }
     }
 }
@@ -35,21 +35,25 @@ impl Activation {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::nn::kernel::{Coefficients, Product, Start, product};
+
+    /// `finish` of a number.
+    fn finished(x: f32, finish: Finish) -> Lanes {
+        let mut result = [Lanes::default()];
+        let of = Product { x: &[Lanes::splat(x)], depth: 1, a: Coefficients::Matrix(&[1.0]), start: Start::Zero, finish };
+        product(&mut result, 1, of);
+        result[0]
+    }
 
     #[test]
     fn derivatives_equal_finite_differences() {
         let h = 1e-3;
         for activation in [Activation::Tanh, Activation::Relu] {
             for x in [-2.0f32, -0.7, 0.3, 1.1] {
-                let at = |x: f32| {
-                    let mut y = [Lanes::splat(x)];
-                    activation.forward(&mut y);
-                    y[0]
-                };
-                let mut d = [Lanes::splat(1.0)];
-                activation.backward(&mut d, &[at(x)]);
+                let at = |x: f32| finished(x, activation.forward());
+                let slope = finished(1.0, activation.backward(&[at(x)]));
                 let numeric = (at(x + h) - at(x - h)) / (2.0 * h);
-                assert!((d[0] - numeric).0[5].abs() < 1e-3, "{activation:?} at {x}");
+                assert!((slope - numeric).0[5].abs() < 1e-3, "{activation:?} at {x}");
             }
         }
     }

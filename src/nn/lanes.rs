@@ -3,6 +3,7 @@
 //! A matrix of samples is cut into *panels* of eight rows; a panel holds entry after entry, each of them for its eight rows at once.
 //! One instruction then works on eight samples, whatever the width of the matrix, and a row past the last is a lane left idle.
 
+use super::kernel;
 use std::ops::{Add, AddAssign, Div, Mul, Neg, Range, Sub};
 
 /// Rows of a panel: what one AVX2 register holds.
@@ -102,6 +103,11 @@ pub struct Panels {
 }
 
 impl Panels {
+    /// Sees to it that [`Panels::reserve`] for at most `panels` panels of this width does not allocate.
+    pub fn provide(&mut self, width: usize, panels: usize) {
+        self.data.reserve((width * panels).saturating_sub(self.data.len()));
+    }
+
     /// Room for `panels` panels of this width, all 0 where it is new; keeps what is there and never shrinks under one width.
     pub fn reserve(&mut self, width: usize, panels: usize) {
         if self.width != width {
@@ -172,6 +178,16 @@ impl Panels {
         values.iter_mut().zip(panel).for_each(|(v, slot)| *v = slot.0[lane]);
     }
 
+    /// Writes the first entries of the rows from panel `panel` on: `count` rows of one length; the lanes of the last panel that none of
+    /// them fills are set to 0.
+    pub fn write_rows<'a>(&mut self, panel: usize, count: usize, row: impl Fn(usize) -> &'a [f32]) {
+        for p in 0..panels_of(count) {
+            let rows = std::array::from_fn(|lane| row((p * LANES + lane).min(count - 1)));
+            kernel::interleave(&mut self.panel_mut(panel + p)[..rows[0].len()], rows);
+        }
+        self.clear_tail(panel * LANES + count);
+    }
+
     /// Zeroes the lanes of row `r` and of all later rows of its panel; nothing when `r` begins a panel.
     pub fn clear_tail(&mut self, r: usize) {
         if !r.is_multiple_of(LANES) {
@@ -193,9 +209,11 @@ mod tests {
     fn rows_come_back_and_tails_are_cleared() {
         let mut panels = Panels::default();
         panels.reserve(3, panels_of(11));
-        for r in 0..11 {
-            panels.write_row(r, &[r as f32, 10.0 + r as f32, -1.0]);
-        }
+        let rows: Vec<[f32; 3]> = (0..11).map(|r| [r as f32, 10.0 + r as f32, -1.0]).collect();
+        rows.iter().enumerate().for_each(|(r, row)| panels.write_row(r, row));
+        let mut together = panels.clone();
+        together.write_rows(0, 11, |r| &rows[r]);
+        assert_eq!(together, panels);
         let mut row = [0.0; 3];
         panels.read_row(9, &mut row);
         assert_eq!((row, panels.get(9, 1)), ([9.0, 19.0, -1.0], 19.0));

@@ -2,7 +2,7 @@
 
 use super::Pass;
 use super::activation::Activation;
-use super::kernel::{Coefficients, Start, prefetch, product};
+use super::kernel::{Coefficients, Finish, Product, Start, product};
 use super::lanes::Lanes;
 use super::pass::BLOCK_PANELS;
 use rand::{Rng, RngExt};
@@ -20,6 +20,17 @@ pub struct Mlp {
 
 /// Panels that go through all layers before the next do: two layers of them fit into a core's first cache, beside the weights.
 const STEP_PANELS: usize = 2;
+
+/// Panels in steps: the last is of three where one panel would be left alone, which a product is slow on.
+fn steps(panels: Range<usize>) -> impl Iterator<Item = Range<usize>> {
+    let mut from = panels.start;
+    std::iter::from_fn(move || {
+        let left = panels.end - from;
+        let size = if left == STEP_PANELS + 1 { left } else { left.min(STEP_PANELS) };
+        from += size;
+        (size > 0).then(|| from - size..from)
+    })
+}
 
 /// A range in blocks of `size`.
 pub fn blocks(panels: Range<usize>, size: usize) -> impl Iterator<Item = Range<usize>> {
@@ -123,7 +134,7 @@ impl Mlp {
 
     /// `pass.output` of these panels from `pass.input`.
     pub fn forward(&self, pass: &mut Pass, panels: Range<usize>) {
-        blocks(panels, STEP_PANELS).for_each(|block| self.forward_block(pass, &block));
+        steps(panels).for_each(|block| self.forward_block(pass, &block));
     }
 
     fn forward_block(&self, pass: &mut Pass, panels: &Range<usize>) {
@@ -133,18 +144,15 @@ impl Mlp {
             let (below, above) = pass.hidden.split_at_mut(layer);
             let x = if layer == 0 { &pass.input } else { &below[layer - 1] };
             let y = if layer + 1 == self.layers() { &mut pass.output } else { &mut above[0] };
-            let y = y.span_mut(panels);
-            let weights = Coefficients::Matrix(&self.params[weights]);
-            product(y, outputs, x.span(panels), inputs, weights, Start::Bias(&self.params[biases]));
-            if layer + 1 < self.layers() {
-                self.activation.forward(y);
-            }
+            let (a, start) = (Coefficients::Matrix(&self.params[weights]), Start::Bias(&self.params[biases]));
+            let finish = if layer + 1 < self.layers() { self.activation.forward() } else { Finish::Nothing };
+            product(y.span_mut(panels), outputs, Product { x: x.span(panels), depth: inputs, a, start, finish });
         }
     }
 
     /// Gradients of the hidden layers of these panels from `pass.d_output`; they stay in the workspace for the two calls below.
     pub fn backward(&self, pass: &mut Pass, panels: Range<usize>) {
-        blocks(panels, STEP_PANELS).for_each(|block| self.backward_block(pass, &block));
+        steps(panels).for_each(|block| self.backward_block(pass, &block));
     }
 
     fn backward_block(&self, pass: &mut Pass, panels: &Range<usize>) {
@@ -152,22 +160,20 @@ impl Mlp {
             let (below, above) = pass.d_hidden.split_at_mut(layer);
             let dy = if layer + 1 == self.layers() { &pass.d_output } else { &above[0] };
             let (dx, y) = (below[layer - 1].span_mut(panels), pass.hidden[layer - 1].span(panels));
-            prefetch(y);
-            self.input_gradient(layer, dx, dy.span(panels));
-            self.activation.backward(dx, y);
+            self.input_gradient(layer, dx, dy.span(panels), self.activation.backward(y));
         }
     }
 
     /// `pass.d_input` of these panels, after [`Mlp::backward`].
     pub fn backward_input(&self, pass: &mut Pass, panels: Range<usize>) {
-        self.input_gradient(0, pass.d_input.span_mut(&panels), pass.d_hidden[0].span(&panels));
+        self.input_gradient(0, pass.d_input.span_mut(&panels), pass.d_hidden[0].span(&panels), Finish::Nothing);
     }
 
-    /// dx = dy w^T.
-    fn input_gradient(&self, layer: usize, dx: &mut [Lanes], dy: &[Lanes]) {
+    /// dx = finish(dy w^T).
+    fn input_gradient(&self, layer: usize, dx: &mut [Lanes], dy: &[Lanes], finish: Finish) {
         let (weights, _) = self.layer_ranges(layer);
-        let transposed = Coefficients::Matrix(&self.transposed[weights]);
-        product(dx, self.widths[layer], dy, self.widths[layer + 1], transposed, Start::Zero);
+        let a = Coefficients::Matrix(&self.transposed[weights]);
+        product(dx, self.widths[layer], Product { x: dy, depth: self.widths[layer + 1], a, start: Start::Zero, finish });
     }
 
     /// Starts the sum of the parameters' gradient in the workspace.
@@ -187,14 +193,14 @@ impl Mlp {
         }
     }
 
-    /// Adds the sum to `gradient`, laid out as the parameters.
+    /// Writes the sum into `gradient`, laid out as the parameters.
     ///
     /// # Panics
     /// When `gradient` is shorter than the parameters.
     pub fn finish_gradient(&self, pass: &Pass, gradient: &mut [f32]) {
         for layer in 0..self.layers() {
             let (weights, biases) = self.layer_ranges(layer);
-            pass.sums.add_to(layer, &mut gradient[weights.start..biases.end], self.widths[layer + 1]);
+            pass.sums.write(layer, &mut gradient[weights.start..biases.end], self.widths[layer + 1]);
         }
     }
 }

@@ -1,7 +1,7 @@
 //! Small multilayer perceptrons: forward and backward side by side, a Gaussian head, Adam. Knows nothing of robots.
 //!
 //! Samples lie in panels of eight rows ([`lanes`]), parameters in flat row-major arrays, all f32. Nothing here allocates once its
-//! workspace ([`Pass`]) has grown to the batch. Matrix products and tanh ([`kernel`]) pick their instructions by the processor's
+//! workspace ([`Pass`]) has grown to the batch. Matrix products with what ends them ([`kernel`]) pick their instructions by the processor's
 //! features; everything else uses no fused multiply-add and gives the same bytes on every processor.
 
 pub mod activation;

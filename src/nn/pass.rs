@@ -1,7 +1,7 @@
 //! The workspace of forward and backward.
 
 use super::Mlp;
-use super::kernel::{Coefficients, Start, product, transpose};
+use super::kernel::{Coefficients, Finish, Product, Start, product, transpose};
 use super::lanes::{LANES, Lanes, Panels, panels_of};
 
 /// Panels that had best go through forward, backward and the gradient before the next do: their activations then wait in a core's second
@@ -32,6 +32,20 @@ impl Pass {
         pass
     }
 
+    /// Sees to it that [`Pass::reserve`] for at most `panels` panels does not allocate, nor the gradient.
+    pub fn provide(&mut self, mlp: &Mlp, panels: usize) {
+        self.reserve(mlp, 0);
+        for (i, width) in mlp.widths()[1..mlp.layers()].iter().enumerate() {
+            self.hidden[i].provide(*width, panels);
+            self.d_hidden[i].provide(*width, panels);
+        }
+        self.input.provide(mlp.inputs(), panels);
+        self.d_input.provide(mlp.inputs(), panels);
+        self.output.provide(mlp.outputs(), panels);
+        self.d_output.provide(mlp.outputs(), panels);
+        self.sums.begin(mlp.widths());
+    }
+
     /// Makes room for `panels` panels; keeps what is there and never shrinks.
     pub fn reserve(&mut self, mlp: &Mlp, panels: usize) {
         let hidden = &mlp.widths()[1..mlp.layers()];
@@ -52,10 +66,12 @@ impl Pass {
 /// the weight of one more input, which is always 1.
 #[derive(Clone, Debug, Default)]
 pub(super) struct GradientSums {
-    /// Samples with inputs for lanes: \[(inputs + 1) / 8\]\[samples\].
+    /// Samples with inputs for lanes: \[(inputs + 1) / 8\]\[samples\], in as much of it as a layer needs.
     x: Vec<Lanes>,
     /// Sums so far, layer by layer: \[(inputs + 1) / 8\]\[outputs\].
     layers: Vec<Vec<Lanes>>,
+    /// Whether a layer's sums are still to begin.
+    fresh: Vec<bool>,
 }
 
 impl GradientSums {
@@ -63,24 +79,32 @@ impl GradientSums {
     pub fn begin(&mut self, widths: &[usize]) {
         self.layers.resize_with(widths.len() - 1, Vec::new);
         for (sums, pair) in self.layers.iter_mut().zip(widths.windows(2)) {
-            sums.clear();
             sums.resize(panels_of(pair[0] + 1) * pair[1], Lanes::default());
         }
+        let inputs = widths[..widths.len() - 1].iter().max().copied().unwrap_or(0);
+        self.x.resize(panels_of(inputs + 1) * BLOCK_PANELS * LANES, Lanes::default());
+        self.fresh.clear();
+        self.fresh.resize(widths.len() - 1, true);
     }
 
-    /// Adds x^T dy to a layer's sums, from panels of `inputs` and of `outputs` entries.
+    /// Adds x^T dy to a layer's sums, from at most [`BLOCK_PANELS`] panels of `inputs` and of `outputs` entries.
     pub fn add(&mut self, layer: usize, x: &[Lanes], inputs: usize, dy: &[Lanes], outputs: usize) {
-        let samples = x.len() / inputs * LANES;
-        self.x.resize(panels_of(inputs + 1) * samples, Lanes::default());
-        transpose(&mut self.x, x, inputs);
-        product(&mut self.layers[layer], outputs, &self.x, samples, Coefficients::Samples(dy), Start::Result);
+        let depth = x.len() / inputs * LANES;
+        let turned = &mut self.x[..panels_of(inputs + 1) * depth];
+        transpose(turned, x, inputs);
+        let start = if std::mem::replace(&mut self.fresh[layer], false) { Start::Zero } else { Start::Result };
+        let of = Product { x: turned, depth, a: Coefficients::Samples(dy), start, finish: Finish::Nothing };
+        product(&mut self.layers[layer], outputs, of);
     }
 
-    /// Adds a layer's sums to its part of the gradient: weights inputs x outputs, then biases.
-    pub fn add_to(&self, layer: usize, gradient: &mut [f32], outputs: usize) {
+    /// Writes a layer's sums into its part of the gradient: weights inputs x outputs, then biases.
+    pub fn write(&self, layer: usize, gradient: &mut [f32], outputs: usize) {
+        if self.fresh[layer] {
+            return gradient.fill(0.0);
+        }
         for (rows, sums) in gradient.chunks_mut(LANES * outputs).zip(self.layers[layer].chunks_exact(outputs)) {
             for (l, row) in rows.chunks_exact_mut(outputs).enumerate() {
-                row.iter_mut().zip(sums).for_each(|(d, sum)| *d += sum.0[l]);
+                row.iter_mut().zip(sums).for_each(|(d, sum)| *d = sum.0[l]);
             }
         }
     }

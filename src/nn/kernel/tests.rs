@@ -1,5 +1,6 @@
 //! The kernels of every path against plain loops.
 
+use super::tiles::{runs, spans};
 use super::*;
 use std::cmp::Ordering;
 
@@ -32,7 +33,8 @@ fn products_equal_plain_loops() {
                 let before = lanes(panels * width, 2);
                 let check = |a: Coefficients, start: Start, at: &dyn Fn(usize, usize) -> f32| {
                     let mut result = before.clone();
-                    product_on(path, &mut result, width, &x, depth, a, start);
+                    let of = Product { x: &x, depth, a, start, finish: Finish::Nothing };
+                    product_on(path, &mut result, width, of);
                     for (i, l) in (0..panels * width).flat_map(|i| (0..LANES).map(move |l| (i, l))) {
                         let (p, f) = (i / width, i % width);
                         let first = match start {
@@ -60,7 +62,8 @@ fn products_equal_plain_loops() {
 #[test]
 #[should_panic(expected = "a matrix is 3 x 2")]
 fn a_matrix_of_another_size_is_refused() {
-    product(&mut lanes(2, 0), 2, &lanes(3, 0), 3, Coefficients::Matrix(&[0.0; 5]), Start::Zero);
+    let (x, a) = (&lanes(3, 0), Coefficients::Matrix(&[0.0; 5]));
+    product(&mut lanes(2, 0), 2, Product { x, depth: 3, a, start: Start::Zero, finish: Finish::Nothing });
 }
 
 #[test]
@@ -80,15 +83,45 @@ fn tanh_is_close_everywhere_and_keeps_nan() {
     }
 }
 
+/// A finish is what a plain product and a loop over its result give, in every tile and on every path.
 #[test]
-fn tanh_backward_is_the_slope_times_the_gradient() {
+fn finishes_are_functions_of_the_plain_product() {
     for path in paths() {
-        let (mut d, y) = (lanes(5, 3), lanes(5, 20));
-        let before = d.clone();
-        tanh_backward_on(path, &mut d, &y);
-        for (i, l) in (0..5).flat_map(|i| (0..LANES).map(move |l| (i, l))) {
-            let expected = before[i].0[l] * (1.0 - y[i].0[l] * y[i].0[l]);
-            assert!((d[i].0[l] - expected).abs() < 1e-6, "{path:?}");
+        for (panels, width) in [(1, 4), (1, 13), (2, 6), (3, 100), (4, 9)] {
+            let (depth, y) = (5, lanes(panels * width, 20));
+            let (x, matrix) = (lanes(panels * depth, 1), (0..depth * width).map(value).collect::<Vec<_>>());
+            let run = |finish: Finish| {
+                let mut result = vec![Lanes::default(); panels * width];
+                let of = Product { x: &x, depth, a: Coefficients::Matrix(&matrix), start: Start::Zero, finish };
+                product_on(path, &mut result, width, of);
+                result
+            };
+            let plain = run(Finish::Nothing);
+            let check = |finish: Finish, expected: &dyn Fn(f32, f32) -> f32| {
+                let got = run(finish);
+                for (i, l) in (0..plain.len()).flat_map(|i| (0..LANES).map(move |l| (i, l))) {
+                    let (expected, got) = (expected(plain[i].0[l], y[i].0[l]), got[i].0[l]);
+                    assert!((got - expected).abs() < 1e-5, "{path:?} {panels} {width}, {i} {l}: {got}, not {expected}");
+                }
+            };
+            check(Finish::Tanh, &|s, _| s.tanh());
+            check(Finish::Relu, &|s, _| s.max(0.0));
+            check(Finish::TanhSlope(&y), &|s, y| s * (1.0 - y * y));
+            check(Finish::ReluSlope(&y), &|s, y| if y > 0.0 { s } else { 0.0 });
+        }
+    }
+}
+
+#[test]
+fn interleaving_puts_rows_into_lanes() {
+    for path in paths() {
+        for entries in [0, 1, 7, 8, 9, 16, 53] {
+            let rows: [Vec<f32>; LANES] = std::array::from_fn(|r| (0..entries + 2).map(|i| value(100 * r + i)).collect());
+            let mut panel = vec![Lanes::splat(9.0); entries];
+            interleave_on(path, &mut panel, std::array::from_fn(|r| rows[r].as_slice()));
+            for (i, r) in (0..entries).flat_map(|i| (0..LANES).map(move |r| (i, r))) {
+                assert_eq!(panel[i].0[r], rows[r][i], "{path:?}, row {r}, entry {i} of {entries}");
+            }
         }
     }
 }
@@ -114,10 +147,15 @@ fn transposing_turns_entries_into_lanes() {
 }
 
 #[test]
-fn parts_cover_a_range_evenly() {
+fn runs_cover_a_range_evenly() {
     for (n, most) in [(0, 6), (1, 6), (9, 6), (100, 6), (25, 10)] {
-        let parts: Vec<_> = parts(n, most).collect();
-        assert_eq!(parts.iter().flat_map(|p| p.clone()).collect::<Vec<_>>(), (0..n).collect::<Vec<_>>());
-        assert!(parts.iter().all(|p| p.len() <= most && p.len() + 1 >= n.div_ceil(n.div_ceil(most).max(1))));
+        let parts: Vec<usize> = runs(n, most).flat_map(|(size, count)| std::iter::repeat_n(size, count)).collect();
+        assert_eq!((parts.iter().sum::<usize>(), parts.len()), (n, n.div_ceil(most)));
+        assert!(parts.iter().all(|size| *size <= most && size + 1 >= n.div_ceil(n.div_ceil(most).max(1))));
+    }
+    for panels in 0..9 {
+        let parts: Vec<usize> = spans(panels).flat_map(|(size, times)| std::iter::repeat_n(size, times)).collect();
+        assert_eq!(parts.iter().sum::<usize>(), panels);
+        assert!(parts.iter().all(|size| *size == 2 || *size == 3 || panels == 1));
     }
 }

@@ -1,0 +1,259 @@
+//! Matrix products, tile by tile: the sums of a tile stay in registers.
+
+use super::super::lanes::{LANES, Lanes};
+use super::entries::{tanh, tanh_slope};
+use super::vector::Vector;
+use super::{Coefficients, Finish, Product, Start};
+
+/// The most entries that a register tile of 1, 2 or 3 panels spans: at most 12 sums of 8 lanes, which leave four of 16 registers for
+/// operands, and at least 8, which hide the latency of FMA. A single panel is bound by loads, whatever it spans.
+const TILE_ENTRIES: [usize; 4] = [0, 10, 6, 3];
+
+/// The addresses of one register tile.
+#[derive(Clone, Copy)]
+pub struct Tile {
+    result: *mut Lanes,
+    width: usize,
+    x: *const Lanes,
+    depth: usize,
+    a: *const f32,
+    /// Coefficients lie in `blocks` of `inner`; distances in floats.
+    blocks: usize,
+    between_blocks: usize,
+    inner: usize,
+    between_k: usize,
+    start: TileStart,
+    finish: TileFinish,
+}
+
+#[derive(Clone, Copy)]
+enum TileStart {
+    Zero,
+    Result,
+    Bias(*const f32),
+}
+
+#[derive(Clone, Copy)]
+enum TileFinish {
+    Nothing,
+    Tanh,
+    Relu,
+    TanhSlope(*const Lanes),
+    ReluSlope(*const Lanes),
+}
+
+/// The product, tile by tile.
+///
+/// # Safety
+/// The lengths fit as [`super::product`] says, and the processor has T's instructions.
+#[inline(always)]
+pub unsafe fn product<T: Vector>(result: &mut [Lanes], width: usize, of: &Product) {
+    let mut p = 0;
+    for (panels, times) in spans(of.x.len() / of.depth) {
+        for _ in 0..times {
+            let mut f = 0;
+            for (entries, count) in runs(width, TILE_ENTRIES[panels]) {
+                // SAFETY: the tiles read entries 0..depth of panels p.. of x, biases f.. and activations at the result's place, and write
+                // entries f.. of panels p.. of the result, all within their arrays; they read a(k, f) for k < depth and f < width, in
+                // a matrix that is number k * width + f < depth * width, among samples number (k / 8 * width + f) * 8 + k % 8 < depth
+                // * width. `result` is borrowed mutably: nothing else aliases it.
+                unsafe {
+                    match of.a {
+                        Coefficients::Matrix(_) => T::tiles::<1>(panels, entries, count, Tile::new(result, width, of, p, f)),
+                        Coefficients::Samples(_) => T::tiles::<LANES>(panels, entries, count, Tile::new(result, width, of, p, f)),
+                    }
+                }
+                f += entries * count;
+            }
+            p += panels;
+        }
+    }
+}
+
+/// Panels of a tile, and how many times: two at a time, and three where one would be left alone.
+#[inline(always)]
+pub fn spans(panels: usize) -> impl Iterator<Item = (usize, usize)> {
+    let (pairs, rest) = match (panels / 2, panels % 2) {
+        (0, rest) => (0, rest),
+        (pairs, 1) => (pairs - 1, 3),
+        (pairs, _) => (pairs, 0),
+    };
+    [(2, pairs), (rest, usize::from(rest > 0))].into_iter().filter(|(_, times)| *times > 0)
+}
+
+/// n as the fewest parts of at most `most`, as even as can be: sizes, and how many parts have them.
+#[inline(always)]
+pub fn runs(n: usize, most: usize) -> impl Iterator<Item = (usize, usize)> {
+    let count = n.div_ceil(most);
+    let (least, longer) = (n / count.max(1), n % count.max(1));
+    [(least + 1, longer), (least, count - longer)].into_iter().filter(|(_, count)| *count > 0)
+}
+
+impl Tile {
+    /// The tile whose first entry is `f` of panel `p`.
+    ///
+    /// # Safety
+    /// That entry exists.
+    #[inline(always)]
+    unsafe fn new(result: &mut [Lanes], width: usize, of: &Product, p: usize, f: usize) -> Tile {
+        let (place, depth) = (p * width + f, of.depth);
+        // SAFETY: the caller's.
+        unsafe {
+            let (a, blocks, between_blocks, inner, between_k) = match of.a {
+                Coefficients::Matrix(values) => (values.as_ptr().add(f), 1, 0, depth, width),
+                Coefficients::Samples(samples) => (samples.as_ptr().add(f).cast(), depth / LANES, LANES * width, LANES, 1),
+            };
+            let start = match of.start {
+                Start::Zero => TileStart::Zero,
+                Start::Result => TileStart::Result,
+                Start::Bias(bias) => TileStart::Bias(bias.as_ptr().add(f)),
+            };
+            let finish = match of.finish {
+                Finish::Nothing => TileFinish::Nothing,
+                Finish::Tanh => TileFinish::Tanh,
+                Finish::Relu => TileFinish::Relu,
+                Finish::TanhSlope(y) => TileFinish::TanhSlope(y.as_ptr().add(place)),
+                Finish::ReluSlope(y) => TileFinish::ReluSlope(y.as_ptr().add(place)),
+            };
+            let (result, x) = (result.as_mut_ptr().add(place), of.x.as_ptr().add(p * depth));
+            Tile { result, width, x, depth, a, blocks, between_blocks, inner, between_k, start, finish }
+        }
+    }
+
+    /// The tile that begins `entries` later, coefficients of neighbouring entries being `between` floats apart.
+    #[inline(always)]
+    fn next(self, entries: usize, between: usize) -> Tile {
+        Tile {
+            result: self.result.wrapping_add(entries),
+            a: self.a.wrapping_add(entries * between),
+            start: match self.start {
+                TileStart::Bias(bias) => TileStart::Bias(bias.wrapping_add(entries)),
+                other => other,
+            },
+            finish: match self.finish {
+                TileFinish::TanhSlope(y) => TileFinish::TanhSlope(y.wrapping_add(entries)),
+                TileFinish::ReluSlope(y) => TileFinish::ReluSlope(y.wrapping_add(entries)),
+                other => other,
+            },
+            ..self
+        }
+    }
+}
+
+/// `count` tiles of P panels and F entries side by side, a(k, f) and a(k, f + 1) being S floats apart.
+///
+/// # Safety
+/// Every address lies within its array, and the processor has T's instructions.
+#[inline(always)]
+unsafe fn tiles<T: Vector, const S: usize, const P: usize, const F: usize>(count: usize, first: Tile) {
+    let mut tile = first;
+    for _ in 0..count {
+        // SAFETY: the caller's.
+        unsafe {
+            if let TileFinish::TanhSlope(y) | TileFinish::ReluSlope(y) = tile.finish {
+                let lines = (0..P).flat_map(|p| (0..F).step_by(2).map(move |f| p * tile.width + f));
+                lines.for_each(|at| T::prefetch(y.wrapping_add(at)));
+            }
+            let sums = sums::<T, S, P, F>(&tile);
+            finish::<T, P, F>(&tile, sums);
+        }
+        tile = tile.next(F, S);
+    }
+}
+
+#[inline(always)]
+unsafe fn sums<T: Vector, const S: usize, const P: usize, const F: usize>(tile: &Tile) -> [[T; P]; F] {
+    // SAFETY: the caller's.
+    unsafe {
+        let mut sums = [[T::splat(0.0); P]; F];
+        let (mut x, mut block) = (tile.x, tile.a);
+        for _ in 0..tile.blocks {
+            let mut a = block;
+            for _ in 0..tile.inner {
+                step::<T, S, P, F>(&mut sums, a, x, tile.depth);
+                (a, x) = (a.wrapping_add(tile.between_k), x.wrapping_add(1));
+            }
+            block = block.wrapping_add(tile.between_blocks);
+        }
+        sums
+    }
+}
+
+/// Adds one k to the sums: its coefficients begin at `a`, its samples at `x`.
+#[inline(always)]
+unsafe fn step<T: Vector, const S: usize, const P: usize, const F: usize>(
+    sums: &mut [[T; P]; F],
+    a: *const f32,
+    x: *const Lanes,
+    depth: usize,
+) {
+    // SAFETY: the caller's.
+    unsafe {
+        let samples: [T; P] = std::array::from_fn(|p| T::load(x.wrapping_add(p * depth)));
+        for (f, sums) in sums.iter_mut().enumerate() {
+            let a = T::splat(*a.add(f * S));
+            for (sum, sample) in sums.iter_mut().zip(samples) {
+                *sum = sample.times_plus(a, *sum);
+            }
+        }
+    }
+}
+
+#[inline(always)]
+unsafe fn finish<T: Vector, const P: usize, const F: usize>(tile: &Tile, sums: [[T; P]; F]) {
+    // SAFETY: the caller's.
+    unsafe {
+        for (f, sums) in sums.into_iter().enumerate() {
+            for (p, sum) in sums.into_iter().enumerate() {
+                let at = p * tile.width + f;
+                let to = tile.result.add(at);
+                let sum = match tile.start {
+                    TileStart::Zero => sum,
+                    TileStart::Result => sum.add(T::load(to)),
+                    TileStart::Bias(bias) => sum.add(T::splat(*bias.add(f))),
+                };
+                let value = match tile.finish {
+                    TileFinish::Nothing => sum,
+                    TileFinish::Tanh => tanh(sum),
+                    TileFinish::Relu => sum.positive(),
+                    TileFinish::TanhSlope(y) => tanh_slope(sum, T::load(y.add(at))),
+                    TileFinish::ReluSlope(y) => sum.where_positive(T::load(y.add(at))),
+                };
+                value.store(to);
+            }
+        }
+    }
+}
+
+/// Picks the tiles compiled for this size.
+///
+/// # Safety
+/// As [`tiles`].
+#[inline(always)]
+pub unsafe fn any_tiles<T: Vector, const S: usize>(panels: usize, entries: usize, count: usize, first: Tile) {
+    // SAFETY: the caller's.
+    unsafe {
+        match (panels, entries) {
+            (1, 1) => tiles::<T, S, 1, 1>(count, first),
+            (1, 2) => tiles::<T, S, 1, 2>(count, first),
+            (1, 3) => tiles::<T, S, 1, 3>(count, first),
+            (1, 4) => tiles::<T, S, 1, 4>(count, first),
+            (1, 5) => tiles::<T, S, 1, 5>(count, first),
+            (1, 6) => tiles::<T, S, 1, 6>(count, first),
+            (1, 7) => tiles::<T, S, 1, 7>(count, first),
+            (1, 8) => tiles::<T, S, 1, 8>(count, first),
+            (1, 9) => tiles::<T, S, 1, 9>(count, first),
+            (1, 10) => tiles::<T, S, 1, 10>(count, first),
+            (2, 1) => tiles::<T, S, 2, 1>(count, first),
+            (2, 2) => tiles::<T, S, 2, 2>(count, first),
+            (2, 3) => tiles::<T, S, 2, 3>(count, first),
+            (2, 4) => tiles::<T, S, 2, 4>(count, first),
+            (2, 5) => tiles::<T, S, 2, 5>(count, first),
+            (2, 6) => tiles::<T, S, 2, 6>(count, first),
+            (3, 1) => tiles::<T, S, 3, 1>(count, first),
+            (3, 2) => tiles::<T, S, 3, 2>(count, first),
+            (3, 3) => tiles::<T, S, 3, 3>(count, first),
+            _ => unreachable!("tiles span 1 to 3 panels, and no more entries than registers hold"),
+        }
+    }
+}

@@ -1,0 +1,98 @@
+//! Eight floats that instructions work on at once.
+
+use super::super::lanes::{LANES, Lanes};
+use super::tiles::Tile;
+
+/// A vector of eight floats.
+///
+/// # Safety
+/// Every function needs the processor to have the vector's instructions, and its addresses to be valid.
+pub trait Vector: Copy {
+    unsafe fn load(from: *const Lanes) -> Self;
+    /// Eight floats, not aligned.
+    unsafe fn load_row(from: *const f32) -> Self;
+    unsafe fn store(self, to: *mut Lanes);
+    unsafe fn splat(value: f32) -> Self;
+    /// self + other.
+    unsafe fn add(self, other: Self) -> Self;
+    /// self * factor.
+    unsafe fn times(self, factor: Self) -> Self;
+    /// self / divisor.
+    unsafe fn over(self, divisor: Self) -> Self;
+    /// self * factor + summand.
+    unsafe fn times_plus(self, factor: Self, summand: Self) -> Self;
+    /// The nearest number to self between -limit and limit; NaN stays.
+    unsafe fn within(self, limit: f32) -> Self;
+    /// max(0, self); NaN stays.
+    unsafe fn positive(self) -> Self;
+    /// self where `y` is above 0, else 0.
+    unsafe fn where_positive(self, y: Self) -> Self;
+    /// Element i of vector r becomes element r of vector i.
+    unsafe fn transposed(square: [Self; LANES]) -> [Self; LANES];
+    /// Asks the processor to bring this into its cache while it works on something else; without effect on any result.
+    unsafe fn prefetch(soon: *const Lanes);
+    /// [`super::tiles::any_tiles`], compiled by itself: merged into its caller the compiler would know `inner` and unroll that loop, to
+    /// its harm.
+    unsafe fn tiles<const S: usize>(panels: usize, entries: usize, count: usize, first: Tile);
+}
+
+impl Vector for Lanes {
+    #[inline(always)]
+    unsafe fn load(from: *const Lanes) -> Self {
+        // SAFETY: the caller's.
+        unsafe { *from }
+    }
+    #[inline(always)]
+    unsafe fn load_row(from: *const f32) -> Self {
+        // SAFETY: the caller's; floats lie side by side in an array.
+        Lanes(unsafe { *from.cast::<[f32; LANES]>() })
+    }
+    #[inline(always)]
+    unsafe fn store(self, to: *mut Lanes) {
+        // SAFETY: the caller's.
+        unsafe { *to = self }
+    }
+    #[inline(always)]
+    unsafe fn splat(value: f32) -> Self {
+        Lanes::splat(value)
+    }
+    #[inline(always)]
+    unsafe fn add(self, other: Self) -> Self {
+        self + other
+    }
+    #[inline(always)]
+    unsafe fn times(self, factor: Self) -> Self {
+        self * factor
+    }
+    #[inline(always)]
+    unsafe fn over(self, divisor: Self) -> Self {
+        Lanes(std::array::from_fn(|i| self.0[i] / divisor.0[i]))
+    }
+    #[inline(always)]
+    unsafe fn times_plus(self, factor: Self, summand: Self) -> Self {
+        self * factor + summand
+    }
+    #[inline(always)]
+    unsafe fn within(self, limit: f32) -> Self {
+        self.map(|v| if v > limit { limit } else { v }).map(|v| if v < -limit { -limit } else { v })
+    }
+    #[inline(always)]
+    unsafe fn positive(self) -> Self {
+        self.map(|v| if v < 0.0 { 0.0 } else { v })
+    }
+    #[inline(always)]
+    unsafe fn where_positive(self, y: Self) -> Self {
+        Lanes(std::array::from_fn(|i| if y.0[i] > 0.0 { self.0[i] } else { 0.0 }))
+    }
+    #[inline(always)]
+    unsafe fn transposed(square: [Self; LANES]) -> [Self; LANES] {
+        std::array::from_fn(|r| Lanes(std::array::from_fn(|i| square[i].0[r])))
+    }
+    #[inline(always)]
+    unsafe fn prefetch(_: *const Lanes) {}
+    #[inline(never)]
+    unsafe fn tiles<const S: usize>(panels: usize, entries: usize, count: usize, first: Tile) {
+        // SAFETY: the caller's.
+        unsafe { super::tiles::any_tiles::<Self, S>(panels, entries, count, first) }
+    }
+}

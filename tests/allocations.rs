@@ -1,0 +1,93 @@
+//! Training allocates nothing in its loop: after two updates, updates on other demos and segments find all the room that they need.
+
+use hilt::config::{ActionChoice, PretrainSettings, TrainSettings};
+use hilt::demo::Demo;
+use hilt::interrupt::Interrupt;
+use hilt::learn::{Learner, pretrain_dynamics};
+use hilt::tasks::Task;
+use std::alloc::{GlobalAlloc, Layout, System};
+use std::cell::Cell;
+
+/// The system's allocator, with a count of what each thread asks of it.
+struct Counting;
+
+thread_local! {
+    static ALLOCATIONS: Cell<usize> = const { Cell::new(0) };
+}
+
+fn count() {
+    ALLOCATIONS.with(|n| n.set(n.get() + 1));
+}
+
+// SAFETY: all is handed to the system's allocator as it came.
+unsafe impl GlobalAlloc for Counting {
+    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
+        count();
+        // SAFETY: the caller's; so below.
+        unsafe { System.alloc(layout) }
+    }
+    unsafe fn alloc_zeroed(&self, layout: Layout) -> *mut u8 {
+        count();
+        // SAFETY: as above.
+        unsafe { System.alloc_zeroed(layout) }
+    }
+    unsafe fn realloc(&self, at: *mut u8, layout: Layout, size: usize) -> *mut u8 {
+        count();
+        // SAFETY: as above.
+        unsafe { System.realloc(at, layout, size) }
+    }
+    unsafe fn dealloc(&self, at: *mut u8, layout: Layout) {
+        // SAFETY: as above.
+        unsafe { System.dealloc(at, layout) }
+    }
+}
+
+#[global_allocator]
+static ALLOCATOR: Counting = Counting;
+
+fn allocations(work: impl FnOnce()) -> usize {
+    let before = ALLOCATIONS.with(Cell::get);
+    work();
+    ALLOCATIONS.with(Cell::get) - before
+}
+
+const DEMOS: usize = 12;
+const BATCH: usize = 4;
+
+/// A demo of 40 steps and more; what it does is of no matter here.
+fn demo(index: usize) -> Demo {
+    let (dim, steps) = (Task::PickUp.state_dim(), 40 + 7 * index);
+    let value = |i: usize| (((i + index) * 37 % 101) as f32 - 50.0) / 100.0;
+    let states = (0..(steps + 1) * dim).map(value).collect();
+    let actions: Vec<f32> = (0..steps * 9).map(value).collect();
+    Demo::new(Task::PickUp, states, actions.clone(), actions).expect("lengths match")
+}
+
+/// One update of Algorithm 1 on four demos that depend on `i`.
+fn update(learner: &mut Learner, i: usize, rows: &mut Vec<usize>) {
+    let demos: [usize; BATCH] = std::array::from_fn(|k| (5 * i + 3 * k) % DEMOS);
+    learner.rows_of(&demos, rows);
+    learner.behavior_cloning(rows, BATCH as f64).expect("finite");
+    learner.state_cloning(&demos, rows).expect("finite");
+    learner.update(0.5, 1e-5);
+    learner.fine_tune(rows).expect("finite");
+}
+
+#[test]
+fn updates_allocate_nothing() {
+    let demos: Vec<Demo> = (0..DEMOS).map(demo).collect();
+    let go = Interrupt::default();
+    let pretrain = PretrainSettings { epochs: 1, ..Default::default() };
+    let (dynamics, _) = pretrain_dynamics(&demos, &demos[..1], &pretrain, 0, &mut |_| {}, &go).expect("the demos are sound");
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("a thread starts");
+    for action in [ActionChoice::Mean, ActionChoice::Sample] {
+        let settings = TrainSettings { batch: BATCH, bc_batch: 128, rho: 0.3, action, ..Default::default() };
+        let mut learner = Learner::new(&demos, &demos[..1], Some(dynamics.clone()), &settings, 0).expect("the demos are sound");
+        pool.install(|| {
+            let mut rows = Vec::new();
+            // the test can fail: the first updates make room
+            assert!(allocations(|| (0..2).for_each(|i| update(&mut learner, i, &mut rows))) > 0);
+            assert_eq!(allocations(|| (2..22).for_each(|i| update(&mut learner, i, &mut rows))), 0, "{action:?}");
+        });
+    }
+}
