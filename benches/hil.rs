@@ -52,7 +52,7 @@ fn learner() -> Learner {
 fn hil_update(learner: &mut Learner, demos: &[usize], rows: &[usize]) {
     learner.behavior_cloning(rows, demos.len() as f64).expect("finite");
     learner.state_cloning(demos, rows).expect("finite");
-    learner.update(0.5, LEARNING_RATE);
+    learner.update(0.5, 1.0, LEARNING_RATE);
     learner.fine_tune(rows).expect("finite");
 }
 
@@ -140,7 +140,7 @@ fn updates(criterion: &mut Criterion) {
         let rows: Vec<usize> = (0..512).map(|i| i * 7 % (DEMOS * STEPS)).collect();
         let mut bc_update = || {
             learner.behavior_cloning(&rows, 512.0 / STEPS as f64).expect("finite");
-            learner.update(0.0, LEARNING_RATE);
+            learner.update(0.0, 1.0, LEARNING_RATE);
             learner.bc_flops_per_update(rows.len() as u64)
         };
         let mut group = criterion.benchmark_group("bc_update");

@@ -96,6 +96,10 @@ fn a_wrong_value_is_refused_with_what_is_allowed() {
     set("scene.yaw=1", &["scene.yaw", "boolean"]);
     set("scene.spawn_x_m=[0.5, 0.3]", &["scene.spawn_x_m", "lower end first"]);
     set("scene.spawn_x_m=[0.5]", &["scene.spawn_x_m"]);
+    set("scene.friction=[1.2, 0.4]", &["scene.friction", "lower end first"]);
+    set("scene.friction=rough", &["scene.friction", "rough", "a number, or a range", "0 to 10"]);
+    set("scene.block_mass_kg=[0.0, 0.3]", &["scene.block_mass_kg", "above 0 up to 10"]);
+    set("scene.base_xy_m=[[0.5, 0.4], 0.3]", &["scene.base_xy_m", "lower end first"]);
     set("scene.obstacles=[{center_m=[0.0,0.0,0.0],size_m=[0.1,0.1,0.0]}]", &["scene.obstacles.size_m", "above 0 up to 4"]);
 }
 

@@ -1,11 +1,13 @@
 use super::common::{SettingsArgs, path_or};
 use super::epochs::Epochs;
 use super::{Context, Outcome, output};
-use crate::config::{Pipeline, Stage};
+use crate::config::{Pipeline, SimulateSettings, Stage};
 use crate::data::{atomic, dataset, table_file, weights};
 use crate::demo::Demo;
 use crate::error::{Error, Result};
 use crate::learn::{EpochMetrics, pretrain_dynamics};
+use crate::{seed, sim};
+use rayon::prelude::*;
 use std::path::{Path, PathBuf};
 
 /// Kind of the weights that this stage writes.
@@ -28,13 +30,14 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome> {
     let pipeline = args.settings.resolve(&[])?;
     let dir = path_or(args.dataset.as_deref(), pipeline.task, "dataset");
     let out = path_or(args.out.as_deref(), pipeline.task, "dynamics.safetensors");
-    let (train, validation) = demos(&dir, &pipeline)?;
+    let (mut train, validation) = demos(&dir, &pipeline)?;
     let provenance = args.settings.provenance(Stage::Pretrain, &pipeline, &[("dataset", &dir)])?;
     let (errors, metrics) = (out.with_extension("parquet"), out.with_file_name("pretraining.parquet"));
     [&errors, &metrics, &out].into_iter().try_for_each(|path| atomic::check_place(path))?;
 
-    let mut epochs = Epochs::new(&context.console);
     let seed = args.settings.seed;
+    train.extend(reexecute(&train, &pipeline, seed, context)?);
+    let mut epochs = Epochs::new(&context.console);
     let mut log = |epoch: &EpochMetrics| epochs.step(epoch);
     let (dynamics, report) = pretrain_dynamics(&train, &validation, &pipeline.pretrain, seed, &mut log, &context.interrupt)?;
     epochs.finish();
@@ -45,6 +48,27 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome> {
     atomic::write_all(&[(errors, error_table), (metrics, metric_table), (out.clone(), weights)])?;
     context.console.say(&format!("pretrain: wrote {}", out.display()));
     Ok(Outcome::Done)
+}
+
+/// The demos' commands executed again in the simulator, `pretrain.reexecute` times each.
+fn reexecute(demos: &[Demo], pipeline: &Pipeline, seed: u64, context: &Context) -> Result<Vec<Demo>> {
+    let times = pipeline.pretrain.reexecute;
+    if times == 0 {
+        return Ok(Vec::new());
+    }
+    let settings = SimulateSettings { pulses: pipeline.pretrain.reexecute_pulses.clone(), ..pipeline.simulate.clone() };
+    let progress = context.console.progress("re-execute", times * demos.len() as u64, "episodes");
+    let again = (0..times * demos.len() as u64).into_par_iter().map(|index| {
+        context.interrupt.check()?;
+        let demo = &demos[(index / times) as usize];
+        let rng = seed::stream(seed, "pretrain.reexecute", index);
+        let episode = sim::reexecute(index, demo, &pipeline.scene, &settings, rng);
+        progress.step();
+        episode.to_demo().map_err(|why| Error::Failed(format!("training demo {} executed again: {why}", index / times)))
+    });
+    let again = again.collect::<Result<_>>()?;
+    progress.finish("");
+    Ok(again)
 }
 
 /// Training and validation demos.

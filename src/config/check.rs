@@ -1,7 +1,7 @@
 //! Refuses settings that are unknown, of a wrong type or out of range, and says what is allowed.
 
-use super::Pipeline;
 use super::ranges::{RANGES, Range};
+use super::{Pipeline, SceneSettings, Spread};
 use crate::error::{Error, Result};
 use crate::scene::Obstacle;
 use crate::tasks::Task;
@@ -26,11 +26,29 @@ pub(super) fn resolve(table: Table, origin: &str) -> Result<Pipeline> {
     for learning in [pipeline.pretrain.validate(), pipeline.train.validate()] {
         learning.map_err(|why| Error::Usage(format!("{origin}: {why}")))?;
     }
-    ordered("scene.spawn_x_m", pipeline.scene.spawn_x_m, origin)?;
-    ordered("scene.spawn_y_m", pipeline.scene.spawn_y_m, origin)?;
-    ordered("scene.goal_x_m", pipeline.scene.goal_x_m, origin)?;
-    ordered("scene.goal_y_m", pipeline.scene.goal_y_m, origin)?;
+    all_ordered(&pipeline.scene, origin)?;
     Ok(pipeline)
+}
+
+fn all_ordered(scene: &SceneSettings, origin: &str) -> Result<()> {
+    let areas = [
+        ("scene.spawn_x_m", scene.spawn_x_m),
+        ("scene.spawn_y_m", scene.spawn_y_m),
+        ("scene.goal_x_m", scene.goal_x_m),
+        ("scene.goal_y_m", scene.goal_y_m),
+    ];
+    let [base_x, base_y] = scene.base_xy_m;
+    let spreads = [
+        ("scene.base_xy_m", base_x),
+        ("scene.base_xy_m", base_y),
+        ("scene.friction", scene.friction),
+        ("scene.block_mass_kg", scene.block_mass_kg),
+    ];
+    let ranges = spreads.into_iter().filter_map(|(key, spread)| match spread {
+        Spread::Fixed(_) => None,
+        Spread::Between(range) => Some((key, range)),
+    });
+    areas.into_iter().chain(ranges).try_for_each(|(key, range)| ordered(key, range, origin))
 }
 
 fn ordered(key: &str, [low, high]: [f64; 2], origin: &str) -> Result<()> {

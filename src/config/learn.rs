@@ -1,6 +1,7 @@
 //! Settings of learning. Defaults are the preset `best`; the literal preset of the paper sets the keys that differ.
 
 use super::choices::{ActionChoice, Alpha, Convergence, FeatureSet, ModelLoss, Objective, Pairs, StateScale, Structure};
+use super::scene::PulseSettings;
 use crate::error::{Error, Result};
 use crate::nn::Activation;
 use serde::{Deserialize, Serialize};
@@ -21,6 +22,11 @@ pub struct PretrainSettings {
     pub structure: Structure,
     /// The loss of Eq. 6.
     pub loss: ModelLoss,
+    /// K: how often each demo's commands are executed again in the simulator, under new noise and the pulses below (Algorithm 4 executes
+    /// them). The dynamics network learns from them; the policy never sees them.
+    pub reexecute: u64,
+    /// Disturbance pulses of those executions.
+    pub reexecute_pulses: PulseSettings,
     /// Epochs E over the demos.
     pub epochs: u64,
     /// Transitions per update, shuffled across demos; 0 = one whole demo per update, as Algorithm 4 has it.
@@ -44,6 +50,8 @@ impl Default for PretrainSettings {
             features: FeatureSet::Fk,
             structure: Structure::Kinematic,
             loss: ModelLoss::StandardisedHuber,
+            reexecute: 0,
+            reexecute_pulses: PulseSettings { probability: 0.01, ..PulseSettings::default() },
             epochs: 200,
             batch_rows: 512,
             learning_rate: 1e-3,
@@ -62,6 +70,7 @@ impl PretrainSettings {
     pub fn validate(&self) -> Result<()> {
         network("pretrain", self.hidden_layers, self.hidden_units)?;
         at_least_one("pretrain.epochs", self.epochs)?;
+        pulses("pretrain.reexecute_pulses", &self.reexecute_pulses)?;
         optimiser("pretrain", self.clip_norm, self.ema_decay)?;
         positive("pretrain.learning_rate", self.learning_rate)?;
         positive("pretrain.final_learning_rate", self.final_learning_rate)
@@ -104,6 +113,20 @@ pub struct TrainSettings {
     pub rho: f64,
     /// Scale of each state entry in L_SC; without effect under `loss = "raw-sum"`.
     pub sc_scale: StateScale,
+    /// Whether L_SC leaves out joint velocities. They repeat the action: with them, coming back to the path costs as much as leaving it.
+    pub sc_mask_dq: bool,
+    /// Whether L_SC leaves the fingers to L_BC: neither their states nor their commands take part. When to open depends on millimetres,
+    /// but L_SC asks for it at a time.
+    pub sc_mask_fingers: bool,
+    /// Error, in units of `sc_scale`, beyond which L_SC grows as a line instead of a parabola; 0 = never. Without it the few large
+    /// errors after a push outweigh the millimetres that decide a release.
+    pub sc_knee: f64,
+    /// Whether L_SC is scaled so that its gradient is as long as that of L_BC before alpha mixes the two.
+    pub sc_balance: bool,
+    /// Variance of the Gaussian noise on each action of a rollout in the dynamics network \[(rad/s)^2\].
+    pub sc_noise_variance: f64,
+    /// Disturbance pulses in those rollouts, as `[simulate.pulses]` makes them in the simulator.
+    pub sc_pulses: PulseSettings,
     /// Which pairs enter the buffer B of Algorithm 3.
     pub sc_pairs: Pairs,
     /// Whether the dynamics network keeps learning from observed transitions (Eq. 6) during training.
@@ -154,6 +177,12 @@ impl Default for TrainSettings {
             alpha_average: true,
             rho: 0.3,
             sc_scale: StateScale::Step,
+            sc_mask_dq: false,
+            sc_mask_fingers: false,
+            sc_knee: 0.0,
+            sc_balance: false,
+            sc_noise_variance: 0.0,
+            sc_pulses: PulseSettings::default(),
             sc_pairs: Pairs::BeforeRecovery,
             fine_tune_dynamics: true,
             dynamics_learning_rate: 1e-4,
@@ -184,6 +213,11 @@ impl TrainSettings {
         }
         unit("train.rho", self.rho)?;
         unit("train.alpha_max", self.alpha_max)?;
+        unit("train.sc_noise_variance", self.sc_noise_variance)?;
+        if !(self.sc_knee >= 0.0 && self.sc_knee.is_finite()) {
+            return refuse("train.sc_knee", self.sc_knee, "0 (no knee) or above");
+        }
+        pulses("train.sc_pulses", &self.sc_pulses)?;
         for (key, value) in [
             ("train.tau", self.tau),
             ("train.initial_std", self.initial_std),
@@ -222,6 +256,18 @@ fn positive(key: &str, value: f64) -> Result<()> {
 
 fn at_least_one(key: &str, value: u64) -> Result<()> {
     if value >= 1 { Ok(()) } else { refuse(key, value, "at least 1") }
+}
+
+/// Strongest pulse that is no slip of the finger \[rad/s\], several times what the joints can do.
+const MAX_PULSE_RAD_S: f64 = 10.0;
+
+fn pulses(key: &str, pulses: &PulseSettings) -> Result<()> {
+    unit(&format!("{key}.probability"), pulses.probability)?;
+    at_least_one(&format!("{key}.steps"), u64::from(pulses.steps))?;
+    match pulses.sigma_rad_s {
+        sigma if (0.0..=MAX_PULSE_RAD_S).contains(&sigma) => Ok(()),
+        sigma => refuse(&format!("{key}.sigma_rad_s"), sigma, &format!("from 0 to {MAX_PULSE_RAD_S}")),
+    }
 }
 
 /// Beyond these a network is a typing error.

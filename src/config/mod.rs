@@ -13,7 +13,7 @@ pub use choices::{ActionChoice, Alpha, Convergence, FeatureSet, ModelLoss, Objec
 pub use data::{ConvertSettings, EvaluateSettings};
 pub use learn::{PretrainSettings, TrainSettings};
 pub use load::{Preset, Source};
-pub use scene::{PlanSettings, PulseSettings, SceneSettings, SimulateSettings};
+pub use scene::{PlanSettings, PulseSettings, SceneSettings, SimulateSettings, Spread};
 
 use crate::error::{Error, Result};
 use crate::tasks::Task;
@@ -81,7 +81,7 @@ impl Stage {
             Stage::Plan => &["scene", "plan"],
             Stage::Simulate => &["simulate"],
             Stage::Convert => &["convert"],
-            Stage::Pretrain => &["pretrain"],
+            Stage::Pretrain => &["scene", "simulate", "pretrain"],
             Stage::Train => &["scene", "simulate", "train"],
             Stage::Evaluate => &["scene", "plan", "simulate", "evaluate"],
         }

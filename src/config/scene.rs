@@ -1,7 +1,28 @@
 //! Settings of the scene, the planner and the simulation.
 
 use crate::scene::Obstacle;
+use rand::{Rng, RngExt};
 use serde::{Deserialize, Serialize};
+
+/// A number of the scene: fixed, or drawn anew for every episode.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(untagged, expecting = "expected a number, or a range to draw from: [low, high]")]
+pub enum Spread {
+    /// The same in every episode.
+    Fixed(f64),
+    /// Uniform between low and high.
+    Between([f64; 2]),
+}
+
+impl Spread {
+    /// The value of one episode. A fixed one takes nothing from `rng`.
+    pub fn draw(self, rng: &mut impl Rng) -> f64 {
+        match self {
+            Spread::Fixed(value) => value,
+            Spread::Between([low, high]) => low + (high - low) * rng.random::<f64>(),
+        }
+    }
+}
 
 /// `[scene]`: what stands where, used by `plan`, `simulate` and `evaluate`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -17,13 +38,14 @@ pub struct SceneSettings {
     pub goal_y_m: [f64; 2],
     /// Whether the block's yaw is random (within a quarter turn) instead of 0.
     pub yaw: bool,
-    /// Where the base block of the stack task stands, x y \[m\]: within reach, and far enough from the spawn area that the open
-    /// hand fits between: from 0.27 m on it had to grasp some blocks from another side, which no small policy learns well.
-    pub base_xy_m: [f64; 2],
-    /// Coulomb friction of the block against everything.
-    pub friction: f64,
-    /// Mass of the block \[kg\].
-    pub block_mass_kg: f64,
+    /// Where the base block of the stack task stands, x y \[m\], each a number or a range: within reach, and far enough from the
+    /// spawn area that the open hand fits between: from 0.27 m on it had to grasp some blocks from another side, which no small
+    /// policy learns well.
+    pub base_xy_m: [Spread; 2],
+    /// Coulomb friction of the block against everything, a number or a range.
+    pub friction: Spread,
+    /// Mass of the block \[kg\], a number or a range.
+    pub block_mass_kg: Spread,
     /// Fixed boxes to keep clear of (`[[scene.obstacles]]`).
     pub obstacles: Vec<Obstacle>,
 }
@@ -36,9 +58,9 @@ impl Default for SceneSettings {
             goal_x_m: [0.32, 0.62],
             goal_y_m: [-0.15, 0.15],
             yaw: false,
-            base_xy_m: [0.45, 0.30],
-            friction: 1.0,
-            block_mass_kg: 0.1,
+            base_xy_m: [Spread::Fixed(0.45), Spread::Fixed(0.30)],
+            friction: Spread::Fixed(1.0),
+            block_mass_kg: Spread::Fixed(0.1),
             obstacles: Vec::new(),
         }
     }

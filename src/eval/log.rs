@@ -2,7 +2,6 @@
 
 use super::Trial;
 use crate::scene::Scene;
-use crate::state::Context;
 use crate::table::{Table, Values};
 use crate::tasks::Task;
 
@@ -25,13 +24,19 @@ pub fn to_table(task: Task, trials: &[Trial]) -> Table {
         .with("hit_obstacle", "Whether a robot link touched an obstacle at any moment.", flags(&|t| t.hit_obstacle))
         .with("block.x_m", "Where the block stood at the start, x.", f64s(&|t| t.scene.block.position_m[0]))
         .with("block.y_m", "Where the block stood at the start, y.", f64s(&|t| t.scene.block.position_m[1]))
-        .with("block.yaw_rad", "How the block was turned about the vertical at the start.", f64s(&|t| yaw(&t.scene)));
-    if task == Task::PickAndPlace {
-        table = table.with("goal.x_m", "The goal, x.", f64s(&|t| goal(&t.scene)[0])).with(
-            "goal.y_m",
-            "The goal, y.",
-            f64s(&|t| goal(&t.scene)[1]),
-        );
+        .with("block.yaw_rad", "How the block was turned about the vertical at the start.", f64s(&|t| yaw(&t.scene)))
+        .with("friction", "Coulomb friction of the block against everything.", f64s(&|t| t.scene.friction))
+        .with("block.mass_kg", "Mass of the block.", f64s(&|t| t.scene.block_mass_kg));
+    let target = match task {
+        Task::PickUp => None,
+        Task::PickAndPlace => Some(("goal", "The goal")),
+        Task::Stack => Some(("base", "Where the base block stood at the start")),
+    };
+    if let Some((name, doc)) = target {
+        for (i, axis) in ["x", "y"].into_iter().enumerate() {
+            let values = f64s(&|t| t.scene.target_m()[i]);
+            table = table.with(&format!("{name}.{axis}_m"), &format!("{doc}, {axis}."), values);
+        }
     }
     for (i, name) in task.condition_names().iter().enumerate() {
         table = table.with(&format!("condition.{name}"), "Whether this condition held at the end.", flags(&|t| t.conditions[i]));
@@ -41,11 +46,4 @@ pub fn to_table(task: Task, trials: &[Trial]) -> Table {
 
 fn yaw(scene: &Scene) -> f64 {
     scene.block.isometry().rotation.euler_angles().2
-}
-
-fn goal(scene: &Scene) -> [f64; 3] {
-    match scene.context {
-        Context::Goal(goal) => goal,
-        Context::None | Context::Base(_) => scene.target_m(),
-    }
 }

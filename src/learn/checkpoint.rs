@@ -1,6 +1,7 @@
 //! The state of training at the end of an epoch as named arrays and a description, and back: with it training goes on as if it had
 //! never stopped. Floats of the networks are arrays; counts and metrics, which f32 cannot hold, go into the description.
 
+use super::hil::Averages;
 use super::learner::{Descent, Learner};
 use super::metrics::EpochMetrics;
 use super::policy::Policy;
@@ -43,7 +44,7 @@ struct Counts {
     net: Steps,
     std: Steps,
     model_adam: Option<u32>,
-    alpha_average: Option<f64>,
+    averages: Averages,
 }
 
 #[derive(Clone, Copy, Debug, Serialize, Deserialize)]
@@ -89,15 +90,15 @@ impl Checkpoint {
             best.log_std = reader.tensor(BEST_STD, &[best.log_std.len()])?;
             Ok::<_, String>(best)
         });
-        let state = learner.state(counts.alpha_average);
+        let state = learner.state(counts.averages);
         Ok((state, History { rows, selection, best: best.transpose()? }))
     }
 }
 
 impl State {
-    /// The average that an adaptive alpha follows.
-    pub fn alpha_average(&self) -> Option<f64> {
-        self.counts.alpha_average
+    /// The averages of the mixing.
+    pub fn averages(&self) -> Averages {
+        self.counts.averages
     }
 
     /// Whether every number of the state is one.
@@ -116,8 +117,8 @@ impl State {
 }
 
 impl Learner {
-    /// All that changes from update to update; `alpha_average` is the mixing's part of it.
-    pub(super) fn state(&self, alpha_average: Option<f64>) -> State {
+    /// All that changes from update to update; `averages` are the mixing's part of it.
+    pub(super) fn state(&self, averages: Averages) -> State {
         let mut tensors = vec![vector(NET, self.policy.net.params()), vector(STD, &self.policy.log_std)];
         push_descent(&mut tensors, NET, &self.net_descent);
         push_descent(&mut tensors, STD, &self.std_descent);
@@ -132,7 +133,7 @@ impl Learner {
             net: self.net_descent.steps(),
             std: self.std_descent.steps(),
             model_adam: self.model.as_ref().map(|model| model.adam.state().2),
-            alpha_average,
+            averages,
         };
         State { tensors, counts }
     }

@@ -72,6 +72,7 @@ impl World {
             demos: 8,
             mean: &mean,
             noise: &noise,
+            pushes: &[],
         };
         let choices = sc::Choices::new(&self.settings, &self.corpus);
         let l_sc = state_cloning(&self.policy, &self.dynamics, batch, &self.segments(), &choices, &mut work);

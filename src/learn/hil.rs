@@ -14,6 +14,7 @@ use crate::nn::cosine;
 use crate::seed::stream;
 use crate::table::Table;
 use rand::seq::SliceRandom;
+use serde::{Deserialize, Serialize};
 
 /// Which losses teach the policy.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -97,12 +98,12 @@ fn warm_start(run: &mut Run, settings: &TrainSettings) -> Result<()> {
             let cloned = learner.behavior_cloning(rows, rows.len() as f64 / learner.mean_length())?;
             metrics.learning_rate =
                 cosine(settings.warm_start_learning_rate, settings.final_learning_rate, learner.updates, total);
-            learner.update(0.0, metrics.learning_rate);
+            learner.update(0.0, 1.0, metrics.learning_rate);
             l_bc.add(cloned.l_bc);
             d_conv.add(cloned.d_conv);
         }
         (metrics.l_bc, metrics.l_mix, metrics.d_conv, metrics.alpha) = (l_bc.get(), l_bc.get(), d_conv.get(), 0.0);
-        run.end_epoch(metrics, None)?;
+        run.end_epoch(metrics, Averages::default())?;
     }
     run.learner.end_stage();
     Ok(())
@@ -113,7 +114,7 @@ fn hybrid_imitation_learning(run: &mut Run, alpha: Alpha, settings: &TrainSettin
     let mut order: Vec<usize> = (0..run.learner.corpus.demos()).collect();
     let batch = settings.batch.min(order.len());
     let per_epoch = order.len().div_ceil(batch) as u64;
-    let mut mixing = Mixing { average: run.alpha_average(), ..Mixing::new(alpha, settings, per_epoch) };
+    let mut mixing = Mixing { averages: run.averages(), ..Mixing::new(alpha, settings, per_epoch) };
     let done = run.enter(HIL);
     // Each epoch shuffles the order of the one before.
     (0..done).for_each(|past| order.shuffle(&mut stream(seed, "train.order", past)));
@@ -131,10 +132,11 @@ fn hybrid_imitation_learning(run: &mut Run, alpha: Alpha, settings: &TrainSettin
             let mixed = if alpha > 0.0 { (1.0 - alpha) * cloned.l_bc + alpha * sc } else { cloned.l_bc }; // Eq. 1
             if i == 0 {
                 (metrics.grad_bc, metrics.grad_sc) = learner.gradient_norms(alpha > 0.0);
+                mixing.see_norms(metrics.grad_bc, metrics.grad_sc);
             }
             let step = epoch * per_epoch + i as u64;
             let rate = cosine(settings.learning_rate, settings.final_learning_rate, step, settings.epochs * per_epoch);
-            learner.update(alpha, rate); // Eq. 2
+            learner.update(alpha, mixing.sc_scale(), rate); // Eq. 2
             if settings.fine_tune_dynamics && mixing.alpha != Alpha::Fixed(0.0) {
                 l_model.add(learner.fine_tune(&rows)?); // Eq. 6, on observed transitions only
             }
@@ -147,7 +149,7 @@ fn hybrid_imitation_learning(run: &mut Run, alpha: Alpha, settings: &TrainSettin
         }
         (metrics.l_bc, metrics.l_sc, metrics.l_mix) = (l_bc.get(), l_sc.get(), l_mix.get());
         (metrics.d_conv, metrics.alpha, metrics.l_model) = (d_conv.get(), alphas.get(), l_model.get());
-        run.end_epoch(metrics, mixing.average)?;
+        run.end_epoch(metrics, mixing.averages)?;
     }
     run.learner.end_stage();
     Ok(())
@@ -159,13 +161,41 @@ struct Mixing {
     cap: f64,
     /// Share of the past in the average; 0 follows d_conv at once.
     keep: f64,
-    average: Option<f64>,
+    averages: Averages,
+    /// Whether the gradient of L_SC is scaled to the length of that of L_BC.
+    balance: bool,
 }
+
+/// What of [`Mixing`] goes on from epoch to epoch.
+#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
+pub(super) struct Averages {
+    /// Of d_conv.
+    d_conv: Option<f64>,
+    /// Mean of the logarithm of the ratio of the two gradients' lengths, over the last epochs.
+    log_ratio: Option<f64>,
+}
+
+/// Share of the past in the mean ratio of the gradients' lengths, which is measured once an epoch.
+const RATIO_KEEP: f64 = 0.8;
 
 impl Mixing {
     fn new(alpha: Alpha, settings: &TrainSettings, updates_per_epoch: u64) -> Self {
         let keep = if settings.alpha_average { 1.0 - 1.0 / updates_per_epoch.max(1) as f64 } else { 0.0 };
-        Mixing { alpha, cap: settings.alpha_max, keep, average: None }
+        Mixing { alpha, cap: settings.alpha_max, keep, averages: Averages::default(), balance: settings.sc_balance }
+    }
+
+    /// Takes in the lengths of the gradients of L_BC and L_SC at an epoch's first update.
+    fn see_norms(&mut self, bc: f64, sc: f64) {
+        let now = (bc / sc).ln();
+        if now.is_finite() {
+            let past = self.averages.log_ratio;
+            self.averages.log_ratio = Some(past.map_or(now, |past| RATIO_KEEP * past + (1.0 - RATIO_KEEP) * now));
+        }
+    }
+
+    /// Factor of L_SC.
+    fn sc_scale(&self) -> f64 {
+        if self.balance { self.averages.log_ratio.map_or(1.0, f64::exp) } else { 1.0 }
     }
 
     fn weight(&mut self, d_conv: f64) -> f64 {
@@ -173,8 +203,8 @@ impl Mixing {
             Alpha::Fixed(alpha) => alpha,
             Alpha::Adaptive => {
                 let now = d_conv.clamp(0.0, 1.0);
-                let average = self.average.map_or(now, |past| self.keep * past + (1.0 - self.keep) * now);
-                self.average = Some(average);
+                let average = self.averages.d_conv.map_or(now, |past| self.keep * past + (1.0 - self.keep) * now);
+                self.averages.d_conv = Some(average);
                 average.min(self.cap)
             }
         }

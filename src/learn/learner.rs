@@ -6,6 +6,7 @@ use super::dynamics::Dynamics;
 use super::fine_tuning::Model;
 use super::metrics::{EpochMetrics, action_errors};
 use super::policy::Policy;
+use super::pushes::Pushes;
 use super::shards::add_scaled;
 use super::state_cloning::{self as sc, Segment, draw_segments};
 use crate::config::{ActionChoice, TrainSettings};
@@ -55,6 +56,7 @@ pub struct Learner {
     validation_work: bc::Workspace,
     segments: Vec<Segment>,
     sc_noise: Vec<f32>,
+    pushes: Pushes,
     gradient: Vec<f32>,
     /// Counts updates of all stages: the number of the random streams.
     pub(super) draws: u64,
@@ -101,6 +103,7 @@ impl Learner {
             validation_work: bc::Workspace::default(),
             segments: Vec::new(),
             sc_noise: Vec::new(),
+            pushes: Pushes::new(settings),
             gradient: vec![0.0; policy.net.params().len()],
             draws: 0,
             settings: settings.clone(),
@@ -165,6 +168,7 @@ impl Learner {
         let lengths = demos.iter().map(|d| self.corpus.demo(*d).len());
         draw_segments(lengths, choices.rho, choices.pairs, &mut rng, &mut self.segments);
         draw_noise(choices.action == ActionChoice::Sample, rows.len(), &mut rng, &mut self.sc_noise);
+        self.pushes.draw(demos.iter().map(|d| self.corpus.demo(*d).len()), &mut rng);
         let batch = sc::Batch {
             corpus: &self.corpus,
             model_inputs: &model.samples.inputs,
@@ -172,6 +176,7 @@ impl Learner {
             demos: demos.len(),
             mean: &self.bc_work.mean,
             noise: &self.sc_noise,
+            pushes: self.pushes.rows(),
         };
         let l_sc = sc::state_cloning(&self.policy, &model.dynamics, batch, &self.segments, choices, &mut self.sc_work);
         self.finite(
@@ -217,9 +222,9 @@ impl Learner {
     }
 
     /// theta <- theta - grad L_mix, by Adam. An update whose gradient is not finite (long rollouts without recovery) is left out.
-    pub fn update(&mut self, alpha: f64, learning_rate: f64) {
+    pub fn update(&mut self, alpha: f64, sc_scale: f64, learning_rate: f64) {
         self.updates += 1;
-        self.mixed_gradient((1.0 - alpha) as f32, alpha as f32);
+        self.mixed_gradient((1.0 - alpha) as f32, (alpha * sc_scale) as f32);
         let norm = clip_by_global_norm(&mut self.gradient, self.settings.clip_norm);
         let mut d_log_std = self.bc_work.d_log_std;
         if self.settings.action == ActionChoice::Sample {

@@ -17,6 +17,7 @@ mod metrics;
 mod model_report;
 mod policy;
 pub mod pretrain_dynamics;
+mod pushes;
 mod regression;
 #[cfg(test)]
 mod resume_tests;

@@ -30,6 +30,8 @@ pub struct Rollout {
     actions: Panels,
     /// Standard normal numbers at the current depth, where actions are sampled.
     noise: Panels,
+    /// Disturbances at the current depth \[rad/s\].
+    pushes: Panels,
     /// Predictions at all depths.
     predictions: Panels,
     /// Gradient with respect to the states at the current depth.
@@ -111,8 +113,8 @@ impl Rollout {
         self.states.reserve(dim, panels);
         self.hands.resize(panels, Hand::default());
         self.predictions.reserve(BASE_DIM, panels);
-        for (array, width) in [(&mut self.actions, JOINTS), (&mut self.noise, JOINTS), (&mut self.d_first, JOINTS)] {
-            array.reserve(width, first);
+        for array in [&mut self.actions, &mut self.noise, &mut self.pushes, &mut self.d_first] {
+            array.reserve(JOINTS, first);
         }
         self.d_states.reserve(BASE_DIM, first);
         self.d_states.span_mut(&(0..first)).fill(Lanes::default());
@@ -164,7 +166,7 @@ impl Rollout {
 
     /// The actions of this depth \[rad/s\].
     fn act(&mut self, depth: Depth, policy: &Policy, batch: Batch, choices: &Choices) {
-        let sampled = choices.action == ActionChoice::Sample;
+        let (sampled, pushed) = (choices.action == ActionChoice::Sample, !batch.pushes.is_empty());
         for (p, _, later) in depth.places() {
             for i in depth.segments(p) {
                 let transition = self.segments[i].start + depth.j;
@@ -174,14 +176,20 @@ impl Rollout {
                 if sampled {
                     self.noise.write_row(i, row(batch.noise, JOINTS, transition));
                 }
+                if pushed {
+                    self.pushes.write_row(i, row(batch.pushes, JOINTS, transition));
+                }
             }
             if depth.j > 0 {
                 self.actions.panel_mut(p).copy_from_slice(self.policy.output.panel(later));
             }
-            let (actions, noise) = (self.actions.panel_mut(p), self.noise.panel(p));
+            let (actions, noise, pushes) = (self.actions.panel_mut(p), self.noise.panel(p), self.pushes.panel(p));
             for (k, (action, eps)) in actions.iter_mut().zip(noise).enumerate() {
                 let shift = if sampled { *eps * policy.log_std[k].exp() } else { Lanes::default() };
                 *action = (*action + shift).map(|mean| policy.action_scaling().undo(k, mean));
+                if pushed {
+                    *action += pushes[k];
+                }
             }
         }
         self.actions.clear_tail(depth.count);
@@ -228,9 +236,12 @@ impl Rollout {
         let (d_state, d_output) = (self.d_states.panel_mut(p), self.model.d_output.panel_mut(at));
         let mut loss = Lanes::default();
         for (k, prediction) in self.predictions.panel(at).iter().enumerate() {
-            let error = *prediction - targets[k];
-            loss += error * error * choices.weights[k];
-            d_state[k] += error * (2.0 * scale * choices.weights[k]);
+            let (error, weight) = (*prediction - targets[k], choices.weights[k]);
+            // Huber's function is a parabola up to the knee, and a line from there
+            let knee = if weight > 0.0 { choices.knee / weight.sqrt() } else { f32::INFINITY };
+            let bent = error.map(|e| e.max(-knee).min(knee));
+            loss += bent * (error * 2.0 - bent) * weight;
+            d_state[k] += bent * (2.0 * scale * weight);
             d_output[k] = d_state[k] * dynamics.residual_scaling().std[k];
         }
         self.loss += loss.0.iter().map(|loss| f64::from(scale * loss)).sum::<f64>();
@@ -248,7 +259,8 @@ impl Rollout {
             }
             let (d_given, d_state) = (&self.model.d_input.panel(at)[seen..], self.d_states.panel(p));
             let d_mean = if depth.j == 0 { self.d_first.panel_mut(p) } else { self.policy.d_output.panel_mut(later) };
-            for k in 0..JOINTS {
+            d_mean[choices.taught..].fill(Lanes::default());
+            for k in 0..choices.taught {
                 let known = if kinematic { d_state[k] * DT_S + d_state[JOINTS + k] } else { Lanes::default() };
                 d_mean[k] = (d_given[k] / dynamics.action_scaling().std[k] + known) * policy.action_scaling().std[k];
                 if choices.action == ActionChoice::Sample {

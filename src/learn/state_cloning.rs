@@ -11,7 +11,7 @@ use super::rollout::Rollout;
 use super::scaling::Scaling;
 use super::shards;
 use crate::config::{ActionChoice, Objective, Pairs, StateScale, TrainSettings};
-use crate::state::{BASE_DIM, JOINTS};
+use crate::state::{ARM_JOINTS, BASE_DIM, JOINTS};
 use rand::{Rng, RngExt};
 use rayon::prelude::*;
 
@@ -58,6 +58,10 @@ pub fn draw_segments(
 pub struct Choices {
     /// Weight of each state entry's squared error.
     pub weights: [f32; BASE_DIM],
+    /// Actions that the gradient reaches: all nine, or those of the arm.
+    pub taught: usize,
+    /// Standardised error beyond which the loss is a line.
+    pub knee: f32,
     /// Whether L_SC is a sum over a demo instead of a mean.
     objective: Objective,
     /// Which pairs enter B.
@@ -81,8 +85,14 @@ impl Choices {
                 Scaling::fit(&changes, BASE_DIM, STEP_FLOOR).std
             }
         };
+        let velocity = |i: usize| (JOINTS..2 * JOINTS).contains(&i);
+        let finger = |i: usize| i < 2 * JOINTS && i % JOINTS >= ARM_JOINTS;
+        let masked = |i: usize| settings.sc_mask_dq && velocity(i) || settings.sc_mask_fingers && finger(i);
+        let weight = |i: usize| if masked(i) { 0.0 } else { 1.0 / (std[i] * std[i]) };
         Choices {
-            weights: std::array::from_fn(|i| 1.0 / (std[i] * std[i])),
+            weights: std::array::from_fn(weight),
+            taught: if settings.sc_mask_fingers { ARM_JOINTS } else { JOINTS },
+            knee: if settings.sc_knee > 0.0 { settings.sc_knee as f32 } else { f32::INFINITY },
             objective: settings.loss,
             pairs: settings.sc_pairs,
             rho: settings.rho,
@@ -114,6 +124,8 @@ pub struct Batch<'a> {
     pub mean: &'a [f32],
     /// Standard normal numbers, rows x 9; empty when the mean is taken.
     pub noise: &'a [f32],
+    /// Disturbances of the rollouts' actions \[rad/s\], rows x 9; empty when there are none.
+    pub pushes: &'a [f32],
 }
 
 /// The workspace: one rollout a shard.

@@ -12,6 +12,7 @@ use crate::robot::jaco::PRESHAPE_RAD;
 use crate::robot::{Ik, READY_Q_RAD};
 use crate::scene::Scene;
 use crate::state::{ARM_JOINTS, CONTROL_DT_S, Context, JOINTS};
+use crate::tasks::REACH_M;
 use nalgebra::Isometry3;
 use rand::Rng;
 
@@ -129,9 +130,10 @@ impl Planner {
 
     /// Joint angles at a hand pose, by way of `seed`.
     pub(super) fn reach(&mut self, knot: &Knot, seed: &[f64; JOINTS], place: &str) -> Result<[f64; JOINTS], PlanError> {
+        let [near, far] = REACH_M;
         self.ik.solve(&tool_pose(knot), seed).map_err(|why| {
             PlanError::Grasp(format!(
-                "the level hand cannot reach {place}: {why}; it reaches 0.28 m to 0.68 m around the base, set the spawn area \
+                "the level hand cannot reach {place}: {why}; it reaches {near} m to {far} m around the base, set the spawn area \
                  (scene.spawn_x_m, scene.spawn_y_m) and scene.base_xy_m within"
             ))
         })

@@ -1,4 +1,5 @@
-//! Reports for people: pictures of episodes and tables on a terminal.
+//! Reports for people: pictures of episodes, charts, and tables on a terminal.
 
+pub mod chart;
 pub mod render;
 pub mod table;

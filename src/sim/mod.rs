@@ -7,9 +7,11 @@ mod convert;
 mod disturbance;
 mod episode;
 mod follower;
+mod replay;
 mod world;
 
 pub use disturbance::Disturbance;
 pub use episode::{Controller, run_episode};
 pub use follower::Follower;
+pub use replay::reexecute;
 pub use world::World;

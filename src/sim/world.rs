@@ -183,7 +183,7 @@ mod tests {
         (0..20).for_each(|_| world.step(&[0.0; JOINTS]));
         let block = world.physics.bodies[world.block].colliders()[0];
         let force: f64 = world.physics.contact_pairs_with(block).map(|pair| contacts::force_n(pair, &world.physics)).sum();
-        let weight = settings.block_mass_kg * f64::from(GRAVITY_M_S2);
+        let weight = scene.block_mass_kg * f64::from(GRAVITY_M_S2);
         assert!((force - weight).abs() < 0.02 * weight, "the table pushes with {force} N against {weight} N");
     }
 }

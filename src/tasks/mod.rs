@@ -7,7 +7,7 @@ mod spawn;
 pub mod stack;
 
 pub use monitor::{Monitor, Observation, Verdict};
-pub use spawn::{REST_HEIGHT_M, draw_scene};
+pub use spawn::{REACH_M, REST_HEIGHT_M, draw_scene};
 
 use crate::state::BASE_DIM;
 use serde::{Deserialize, Serialize};
