@@ -88,7 +88,7 @@ need-cargo:
 # --- checks ---------------------------------------------------------------------------------------------------------------------
 
 # A few episodes, a few updates: every stage runs, nothing is learned.
-SMOKE := plan.episodes=12 pretrain.epochs=2 train.warm_start_updates=50 train.epochs=1 evaluate.episodes=8
+SMOKE := plan.episodes=12 pretrain.epochs=2 train.warm_start_updates=50 train.epochs=1 train.min_updates=0 evaluate.episodes=8
 smoke: build ## a tiny run of all stages under RUNS/smoke/TASK, in less than a minute
 	$(MAKE) --no-print-directory all RUNS=$(RUNS)/smoke SET="$(SMOKE) $(SET)"
 	$(HILT) evaluate $(FLAGS) --threads $(THREADS) --policy planner --episodes 8

@@ -114,7 +114,7 @@ impl Lab {
                     (0.0, policy.wall_s, policy)
                 }
                 Method::Sc => with_model(fill(hil.cpu_s, SC_PROBE, |epochs| {
-                    let sets = [format!("train.epochs={epochs}")];
+                    let sets = [format!("train.epochs={epochs}"), "train.min_updates=0".into()];
                     self.train(label, &setup.with(&sets), Method::Sc, demos, Some(&model))
                 })?),
             };

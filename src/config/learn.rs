@@ -141,6 +141,8 @@ pub struct TrainSettings {
     pub warm_start_learning_rate: f64,
     /// Epochs E of Algorithm 1; 0 = only the warm start.
     pub epochs: u64,
+    /// Fewest updates of Algorithm 1: with few demos an epoch is short, and there are more epochs. Without effect when `epochs` is 0.
+    pub min_updates: u64,
     /// Demos per update of Algorithm 1 (paper: 1).
     pub batch: usize,
     /// Adam's learning rate at the first update of Algorithm 1 (paper: 1e-3).
@@ -153,9 +155,8 @@ pub struct TrainSettings {
     pub ema_decay: f64,
     /// Episodes that choose among the policies along the way, none of which an evaluation uses; 0 = keep the last policy.
     pub select_episodes: u64,
-    /// Epochs of Algorithm 1 between two candidates. The warm start offers as many as Algorithm 1 does, evenly spaced; the policies
-    /// at the end of both are always among them.
-    pub select_every: u64,
+    /// Candidates of the warm start and of Algorithm 1, each: evenly spaced, the last at the end.
+    pub select_candidates: u64,
 }
 
 impl Default for TrainSettings {
@@ -173,16 +174,16 @@ impl Default for TrainSettings {
             d_conv: Convergence::Agreement,
             tau: 0.5,
             alpha: Alpha::Adaptive,
-            alpha_max: 1.0,
+            alpha_max: 0.8,
             alpha_average: true,
             rho: 0.3,
             sc_scale: StateScale::Step,
-            sc_mask_dq: false,
+            sc_mask_dq: true,
             sc_mask_fingers: false,
-            sc_knee: 0.0,
-            sc_balance: false,
-            sc_noise_variance: 0.0,
-            sc_pulses: PulseSettings::default(),
+            sc_knee: 0.3,
+            sc_balance: true,
+            sc_noise_variance: 0.001,
+            sc_pulses: PulseSettings { probability: 0.03, ..PulseSettings::default() },
             sc_pairs: Pairs::BeforeRecovery,
             fine_tune_dynamics: true,
             dynamics_learning_rate: 1e-4,
@@ -190,18 +191,24 @@ impl Default for TrainSettings {
             bc_batch: 512,
             warm_start_learning_rate: 1e-3,
             epochs: 60,
+            min_updates: 2000,
             batch: 8,
             learning_rate: 3e-4,
             final_learning_rate: 1e-5,
             clip_norm: 1.0,
             ema_decay: 0.999,
             select_episodes: 0,
-            select_every: 10,
+            select_candidates: 3,
         }
     }
 }
 
 impl TrainSettings {
+    /// Epochs of Algorithm 1 when one has `per_epoch` updates.
+    pub fn epochs_of(&self, per_epoch: u64) -> u64 {
+        if self.epochs == 0 { 0 } else { self.epochs.max(self.min_updates.div_ceil(per_epoch.max(1))) }
+    }
+
     /// Checks every key.
     ///
     /// # Errors
@@ -231,7 +238,7 @@ impl TrainSettings {
         }
         at_least_one("train.batch", self.batch as u64)?;
         at_least_one("train.bc_batch", self.bc_batch as u64)?;
-        at_least_one("train.select_every", self.select_every)?;
+        at_least_one("train.select_candidates", self.select_candidates)?;
         if self.select_episodes > MOST_EPISODES {
             return refuse("train.select_episodes", self.select_episodes, &format!("from 0 to {MOST_EPISODES}"));
         }

@@ -1,7 +1,7 @@
 //! The state of training at the end of an epoch as named arrays and a description, and back: with it training goes on as if it had
 //! never stopped. Floats of the networks are arrays; counts and metrics, which f32 cannot hold, go into the description.
 
-use super::hil::MixingState;
+use super::hil::Averages;
 use super::learner::{Descent, Learner};
 use super::metrics::EpochMetrics;
 use super::policy::Policy;
@@ -44,7 +44,7 @@ struct Counts {
     net: Steps,
     std: Steps,
     model_adam: Option<u32>,
-    mixing: MixingState,
+    averages: Averages,
 }
 
 #[derive(Clone, Copy, Debug, Serialize, Deserialize)]
@@ -90,15 +90,15 @@ impl Checkpoint {
             best.log_std = reader.tensor(BEST_STD, &[best.log_std.len()])?;
             Ok::<_, String>(best)
         });
-        let state = learner.state(counts.mixing);
+        let state = learner.state(counts.averages);
         Ok((state, History { rows, selection, best: best.transpose()? }))
     }
 }
 
 impl State {
-    /// What the mixing of the losses remembers.
-    pub fn mixing(&self) -> MixingState {
-        self.counts.mixing
+    /// The averages of the mixing.
+    pub fn averages(&self) -> Averages {
+        self.counts.averages
     }
 
     /// Whether every number of the state is one.
@@ -117,8 +117,8 @@ impl State {
 }
 
 impl Learner {
-    /// All that changes from update to update; `mixing` is what lies outside the learner.
-    pub(super) fn state(&self, mixing: MixingState) -> State {
+    /// All that changes from update to update; `averages` are the mixing's part of it.
+    pub(super) fn state(&self, averages: Averages) -> State {
         let mut tensors = vec![vector(NET, self.policy.net.params()), vector(STD, &self.policy.log_std)];
         push_descent(&mut tensors, NET, &self.net_descent);
         push_descent(&mut tensors, STD, &self.std_descent);
@@ -133,7 +133,7 @@ impl Learner {
             net: self.net_descent.steps(),
             std: self.std_descent.steps(),
             model_adam: self.model.as_ref().map(|model| model.adam.state().2),
-            mixing,
+            averages,
         };
         State { tensors, counts }
     }

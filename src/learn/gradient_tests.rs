@@ -4,10 +4,13 @@ use super::behavior_cloning::{self as bc, behavior_cloning, policy_gradient};
 use super::corpus::{Corpus, Samples, row};
 use super::dynamics::Dynamics;
 use super::policy::Policy;
+use super::pushes::Pushes;
 use super::shards::add_scaled;
 use super::state_cloning::{self as sc, Segment, draw_segments, state_cloning};
 use super::testing::demos;
-use crate::config::{ActionChoice, FeatureSet, Objective, Pairs, PretrainSettings, StateScale, Structure, TrainSettings};
+use crate::config::{
+    ActionChoice, FeatureSet, Objective, Pairs, PretrainSettings, PulseSettings, StateScale, Structure, TrainSettings,
+};
 use crate::nn::{Activation, LANES, Lanes, Pass};
 use crate::seed::stream;
 use crate::state::{BASE_DIM, JOINTS};
@@ -60,11 +63,18 @@ impl World {
         segments
     }
 
+    fn pushes(&self) -> Pushes {
+        let mut pushes = Pushes::new(&self.settings, self.rows.len());
+        let lengths = [6, 1, 3, 0, 5, 2, 4, 7].map(|d| self.corpus.demo(d).len());
+        pushes.draw(lengths.into_iter(), &mut stream(8, "pushes", 0));
+        pushes
+    }
+
     /// L_SC with its whole gradient.
     fn sc_loss(&self, gradient: &mut Vec<f32>, d_log_std: &mut [f32; JOINTS]) -> f64 {
         let (mut bc_work, mut work) = (bc::Workspace::default(), sc::Workspace::default());
         self.bc_loss(&mut bc_work);
-        let noise = noise(&self.settings, self.rows.len());
+        let (noise, pushes) = (noise(&self.settings, self.rows.len()), self.pushes());
         let mean = bc_work.mean.clone();
         let batch = sc::Batch {
             corpus: &self.corpus,
@@ -73,7 +83,7 @@ impl World {
             demos: 8,
             mean: &mean,
             noise: &noise,
-            pushes: &[],
+            pushes: pushes.rows(),
         };
         let choices = sc::Choices::new(&self.settings, &self.corpus);
         let l_sc = state_cloning(&self.policy, &self.dynamics, batch, &self.segments(), &choices, &mut work);
@@ -161,6 +171,10 @@ fn sc_worlds() -> Vec<(&'static str, World)> {
                     action: ActionChoice::Sample,
                     loss: Objective::RawSum,
                     sc_pairs: Pairs::AfterRecovery,
+                    sc_mask_dq: false,
+                    sc_knee: 0.0,
+                    sc_noise_variance: 0.0,
+                    sc_pulses: PulseSettings::default(),
                     ..defaults.clone()
                 }),
             ),
@@ -199,7 +213,7 @@ fn step_by_step(world: &World, gradient: &mut [f32]) -> f64 {
     let World { corpus, policy, dynamics, settings, .. } = world;
     let choices = sc::Choices::new(settings, corpus);
     let scale = choices.scale(world.rows.len(), 8);
-    let noise = noise(settings, world.rows.len());
+    let (noise, pushes) = (noise(settings, world.rows.len()), world.pushes());
     let first_lane = |v: f32| Lanes(std::array::from_fn(|l| if l == 0 { v } else { 0.0 }));
     let splat = |row: &[f32]| -> Vec<Lanes> { row.iter().map(|v| Lanes::splat(*v)).collect() };
     let (mut coins, mut l_sc, mut at) = (stream(5, "coins", 0), 0.0f64, 0);
@@ -216,7 +230,8 @@ fn step_by_step(world: &World, gradient: &mut [f32]) -> f64 {
                 .map(|k| {
                     let eps = noise.get((at + t) * JOINTS + k).copied().unwrap_or(0.0);
                     let mean = pi.output.get(t * LANES, k) + policy.log_std[k].exp() * eps;
-                    Lanes::splat(policy.action_scaling().undo(k, mean))
+                    let push = pushes.rows().get((at + t) * JOINTS + k).copied().unwrap_or(0.0);
+                    Lanes::splat(policy.action_scaling().undo(k, mean) + push)
                 })
                 .collect();
             dynamics.write_inputs(&s, &action, f.input.panel_mut(t));
@@ -229,8 +244,10 @@ fn step_by_step(world: &World, gradient: &mut [f32]) -> f64 {
             let mut d_prediction = [Lanes::default(); BASE_DIM];
             for k in (0..BASE_DIM).filter(|_| counts) {
                 let error = prediction[k].0[0] - target[k];
-                l_sc += f64::from(scale * choices.weights[k] * error * error);
-                d_prediction[k] = first_lane(2.0 * scale * choices.weights[k] * error);
+                let (weight, size) = (choices.weights[k], error.abs() * choices.weights[k].sqrt());
+                let over = (size - choices.knee).max(0.0); // squared error up to the knee, its tangent from there
+                l_sc += f64::from(scale * (size * size - over * over));
+                d_prediction[k] = first_lane(2.0 * scale * weight.sqrt() * size.min(choices.knee) * error.signum());
             }
             if coin {
                 prediction[..BASE_DIM].copy_from_slice(&splat(target));
@@ -254,7 +271,8 @@ fn step_by_step(world: &World, gradient: &mut [f32]) -> f64 {
             for k in 0..JOINTS {
                 let base = if known { d_next[k] * 0.05 + d_next[JOINTS + k] } else { Lanes::default() };
                 let d_action = f.d_input.panel(t)[seen + k] / dynamics.action_scaling().std[k] + base;
-                pi.d_output.panel_mut(t)[k] = d_action * policy.action_scaling().std[k];
+                let d_mean = d_action * policy.action_scaling().std[k];
+                pi.d_output.panel_mut(t)[k] = if k < choices.taught { d_mean } else { Lanes::default() };
             }
             policy.net.backward(&mut pi, t..t + 1);
             policy.net.backward_input(&mut pi, t..t + 1);
@@ -280,7 +298,9 @@ fn step_by_step(world: &World, gradient: &mut [f32]) -> f64 {
 
 #[test]
 fn batched_segments_equal_algorithm_3_step_by_step() {
-    for (name, world) in sc_worlds() {
+    let masked = small(TrainSettings { sc_mask_fingers: true, ..Default::default() });
+    let masked = ("fingers left out", world(Task::Stack, Structure::Kinematic, masked));
+    for (name, world) in sc_worlds().into_iter().chain([masked]) {
         let (mut batched, mut plain) = (Vec::new(), vec![0.0; world.policy.net.params().len()]);
         let loss = world.sc_loss(&mut batched, &mut [0.0; JOINTS]);
         let expected = step_by_step(&world, &mut plain);

@@ -103,7 +103,7 @@ fn warm_start(run: &mut Run, settings: &TrainSettings) -> Result<()> {
             d_conv.add(cloned.d_conv);
         }
         (metrics.l_bc, metrics.l_mix, metrics.d_conv, metrics.alpha) = (l_bc.get(), l_bc.get(), d_conv.get(), 0.0);
-        run.end_epoch(metrics, MixingState::default())?;
+        run.end_epoch(metrics, Averages::default())?;
     }
     run.learner.end_stage();
     Ok(())
@@ -114,15 +114,16 @@ fn hybrid_imitation_learning(run: &mut Run, alpha: Alpha, settings: &TrainSettin
     let mut order: Vec<usize> = (0..run.learner.corpus.demos()).collect();
     let batch = settings.batch.min(order.len());
     let per_epoch = order.len().div_ceil(batch) as u64;
-    let mut mixing = Mixing { state: run.mixing(), ..Mixing::new(alpha, settings, per_epoch) };
+    let epochs = settings.epochs_of(per_epoch);
+    let mut mixing = Mixing { averages: run.averages(), ..Mixing::new(alpha, settings, per_epoch) };
     let mut rows = Vec::new();
     let done = run.enter(HIL);
     // Each epoch shuffles the order of the one before.
     (0..done).for_each(|past| order.shuffle(&mut stream(seed, "train.order", past)));
-    for epoch in done..settings.epochs {
+    for epoch in done..epochs {
         order.shuffle(&mut stream(seed, "train.order", epoch));
         let [mut l_bc, mut l_sc, mut l_mix, mut d_conv, mut alphas, mut l_model] = [Mean::default(); 6];
-        let mut metrics = EpochMetrics::new(HIL, epoch + 1, settings.epochs);
+        let mut metrics = EpochMetrics::new(HIL, epoch + 1, epochs);
         for (i, demos) in order.chunks(batch).enumerate() {
             run.check()?;
             let learner = &mut run.learner;
@@ -136,7 +137,7 @@ fn hybrid_imitation_learning(run: &mut Run, alpha: Alpha, settings: &TrainSettin
                 mixing.see_norms(metrics.grad_bc, metrics.grad_sc);
             }
             let step = epoch * per_epoch + i as u64;
-            let rate = cosine(settings.learning_rate, settings.final_learning_rate, step, settings.epochs * per_epoch);
+            let rate = cosine(settings.learning_rate, settings.final_learning_rate, step, epochs * per_epoch);
             learner.update(alpha, mixing.sc_scale(), rate); // Eq. 2
             if settings.fine_tune_dynamics && mixing.alpha != Alpha::Fixed(0.0) {
                 l_model.add(learner.fine_tune(&rows)?); // Eq. 6, on observed transitions only
@@ -150,7 +151,7 @@ fn hybrid_imitation_learning(run: &mut Run, alpha: Alpha, settings: &TrainSettin
         }
         (metrics.l_bc, metrics.l_sc, metrics.l_mix) = (l_bc.get(), l_sc.get(), l_mix.get());
         (metrics.d_conv, metrics.alpha, metrics.l_model) = (d_conv.get(), alphas.get(), l_model.get());
-        run.end_epoch(metrics, mixing.state)?;
+        run.end_epoch(metrics, mixing.averages)?;
     }
     run.learner.end_stage();
     Ok(())
@@ -162,17 +163,17 @@ struct Mixing {
     cap: f64,
     /// Share of the past in the average; 0 follows d_conv at once.
     keep: f64,
+    averages: Averages,
     /// Whether the gradient of L_SC is scaled to the length of that of L_BC.
     balance: bool,
-    state: MixingState,
 }
 
-/// What the mixing remembers from update to update.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub(super) struct MixingState {
-    /// The average that an adaptive alpha follows.
-    average: Option<f64>,
-    /// Mean over the last epochs of ln(length of the gradient of L_BC / length of that of L_SC).
+/// What of [`Mixing`] goes on from epoch to epoch.
+#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
+pub(super) struct Averages {
+    /// Of d_conv.
+    d_conv: Option<f64>,
+    /// Mean of the logarithm of the ratio of the two gradients' lengths, over the last epochs.
     log_ratio: Option<f64>,
 }
 
@@ -182,20 +183,21 @@ const RATIO_KEEP: f64 = 0.8;
 impl Mixing {
     fn new(alpha: Alpha, settings: &TrainSettings, updates_per_epoch: u64) -> Self {
         let keep = if settings.alpha_average { 1.0 - 1.0 / updates_per_epoch.max(1) as f64 } else { 0.0 };
-        Mixing { alpha, cap: settings.alpha_max, keep, balance: settings.sc_balance, state: MixingState::default() }
+        Mixing { alpha, cap: settings.alpha_max, keep, averages: Averages::default(), balance: settings.sc_balance }
     }
 
     /// Takes in the lengths of the gradients of L_BC and L_SC at an epoch's first update.
     fn see_norms(&mut self, bc: f64, sc: f64) {
         let now = (bc / sc).ln();
         if now.is_finite() {
-            self.state.log_ratio = Some(self.state.log_ratio.map_or(now, |past| RATIO_KEEP * past + (1.0 - RATIO_KEEP) * now));
+            let past = self.averages.log_ratio;
+            self.averages.log_ratio = Some(past.map_or(now, |past| RATIO_KEEP * past + (1.0 - RATIO_KEEP) * now));
         }
     }
 
     /// Factor of L_SC.
     fn sc_scale(&self) -> f64 {
-        if self.balance { self.state.log_ratio.map_or(1.0, f64::exp) } else { 1.0 }
+        if self.balance { self.averages.log_ratio.map_or(1.0, f64::exp) } else { 1.0 }
     }
 
     fn weight(&mut self, d_conv: f64) -> f64 {
@@ -203,8 +205,8 @@ impl Mixing {
             Alpha::Fixed(alpha) => alpha,
             Alpha::Adaptive => {
                 let now = d_conv.clamp(0.0, 1.0);
-                let average = self.state.average.map_or(now, |past| self.keep * past + (1.0 - self.keep) * now);
-                self.state.average = Some(average);
+                let average = self.averages.d_conv.map_or(now, |past| self.keep * past + (1.0 - self.keep) * now);
+                self.averages.d_conv = Some(average);
                 average.min(self.cap)
             }
         }
@@ -225,5 +227,24 @@ mod tests {
         assert_eq!(mixing.weight(0.0), 0.0);
         assert!((mixing.weight(1.0) - 0.1).abs() < 1e-12);
         assert_eq!(Mixing::new(Alpha::Fixed(0.3), &settings, 10).weight(1.0), 0.3);
+    }
+
+    #[test]
+    fn l_sc_is_scaled_to_the_gradient_of_l_bc() {
+        let settings = TrainSettings { sc_balance: true, ..Default::default() };
+        let mut mixing = Mixing::new(Alpha::Adaptive, &settings, 10);
+        assert_eq!(mixing.sc_scale(), 1.0);
+        mixing.see_norms(0.2, 20.0);
+        assert!((mixing.sc_scale() - 0.01).abs() < 1e-12);
+        mixing.see_norms(0.2, f64::NAN);
+        mixing.see_norms(0.2, 2.0);
+        assert!((mixing.sc_scale().log10() + 1.8).abs() < 1e-12, "{}", mixing.sc_scale());
+    }
+
+    #[test]
+    fn few_demos_get_more_epochs() {
+        let settings = TrainSettings { epochs: 60, min_updates: 2000, ..Default::default() };
+        assert_eq!([3, 34, 100].map(|per_epoch| settings.epochs_of(per_epoch)), [667, 60, 60]);
+        assert_eq!(TrainSettings { epochs: 0, ..settings }.epochs_of(3), 0);
     }
 }

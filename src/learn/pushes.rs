@@ -15,7 +15,8 @@ pub struct Pushes {
 impl Pushes {
     /// As the settings say, with room for `most_rows` transitions.
     pub fn new(settings: &TrainSettings, most_rows: usize) -> Self {
-        Pushes { sigma_rad_s: settings.sc_noise_variance.sqrt() as f32, pulses: settings.sc_pulses.clone(), rows: Vec::new() }
+        let sigma_rad_s = settings.sc_noise_variance.sqrt() as f32;
+        Pushes { sigma_rad_s, pulses: settings.sc_pulses.clone(), rows: Vec::with_capacity(most_rows * JOINTS) }
     }
 
     /// Draws the disturbances of demos of these lengths.
@@ -48,4 +49,37 @@ impl Pushes {
 
 fn normal(rng: &mut impl Rng) -> f32 {
     StandardNormal.sample(rng)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::seed::stream;
+
+    fn drawn(settings: &TrainSettings, lengths: &[usize]) -> Vec<f32> {
+        let mut pushes = Pushes::new(settings, 10);
+        pushes.draw(lengths.iter().copied(), &mut stream(1, "pushes", 0));
+        pushes.rows
+    }
+
+    #[test]
+    fn pulses_last_their_steps_on_the_arm_and_end_with_the_demo() {
+        let pulses = PulseSettings { probability: 1.0, steps: 3, sigma_rad_s: 0.2 };
+        let rows = drawn(&TrainSettings { sc_noise_variance: 0.0, sc_pulses: pulses, ..Default::default() }, &[4, 2]);
+        let row = |t: usize| &rows[t * JOINTS..(t + 1) * JOINTS];
+        assert!(row(0) == row(2) && row(2) != row(3) && row(3) != row(4) && row(4) == row(5), "{rows:?}");
+        assert!((0..6).all(|t| row(t)[ARM_JOINTS..] == [0.0; JOINTS - ARM_JOINTS]));
+    }
+
+    #[test]
+    fn the_noise_has_its_variance_on_all_joints() {
+        let off = PulseSettings { probability: 0.0, ..PulseSettings::default() };
+        let settings = TrainSettings { sc_noise_variance: 0.04, sc_pulses: off, ..Default::default() };
+        let rows = drawn(&settings, &[2000]);
+        for joint in 0..JOINTS {
+            let variance = rows.chunks(JOINTS).map(|row| row[joint].powi(2)).sum::<f32>() / 2000.0;
+            assert!((variance - 0.04).abs() < 0.006, "joint {joint}: {variance}");
+        }
+        assert!(drawn(&TrainSettings { sc_noise_variance: 0.0, ..settings }, &[5]).is_empty());
+    }
 }

@@ -23,8 +23,9 @@ fn quick() -> TrainSettings {
         warm_start_updates: 10,
         bc_batch: 64,
         epochs: 3,
+        min_updates: 0,
         batch: 3,
-        select_every: 1,
+        select_candidates: 3,
         ..Default::default()
     }
 }
@@ -63,7 +64,7 @@ fn from_every_epoch_on_training_ends_with_the_same_bits() {
     let go = Interrupt::default();
     for (method, settings) in [
         (Method::Hil, quick()),
-        (Method::Hil, TrainSettings { select_episodes: 5, ..quick() }),
+        (Method::Hil, TrainSettings { select_episodes: 5, sc_balance: true, ..quick() }),
         (Method::Bc, TrainSettings { select_episodes: 5, ..quick() }),
         (Method::Sc, TrainSettings { clip_norm: 0.0, ..quick() }),
         (Method::Hil, TrainSettings { warm_start_updates: 0, alpha: Alpha::Fixed(0.5), ..quick() }),

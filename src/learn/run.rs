@@ -1,7 +1,7 @@
 //! A run of training between its epochs: metrics, model selection, checkpoints, and where to go on after one.
 
 use super::checkpoint::{Checkpoint, History, State};
-use super::hil::{MixingState, Trained};
+use super::hil::{Averages, Trained};
 use super::learner::Learner;
 use super::metrics::{EpochMetrics, table};
 use super::policy::Policy;
@@ -92,9 +92,9 @@ impl<'a> Run<'a> {
         }
     }
 
-    /// What the mixing of the losses remembered at the end of the last epoch.
-    pub fn mixing(&self) -> MixingState {
-        self.good.as_ref().map(State::mixing).unwrap_or_default()
+    /// The averages of the mixing, as they were at the end of the last epoch.
+    pub fn averages(&self) -> Averages {
+        self.good.as_ref().map(State::averages).unwrap_or_default()
     }
 
     /// Stops on Ctrl-C.
@@ -109,11 +109,11 @@ impl<'a> Run<'a> {
     ///
     /// # Errors
     /// [`Error::Failed`] when no update of the epoch could be made or a number is none any more; what rollouts return.
-    pub fn end_epoch(&mut self, metrics: EpochMetrics, mixing: MixingState) -> Result<()> {
+    pub fn end_epoch(&mut self, metrics: EpochMetrics, averages: Averages) -> Result<()> {
         let row = self.learner.validate(metrics);
         self.check_validation(&row)?;
         self.refuse_standstill(&row)?;
-        let state = self.learner.state(mixing);
+        let state = self.learner.state(averages);
         state.check(&row)?;
         (self.hooks.log)(&row);
         self.history.rows.push(row);

@@ -1,6 +1,6 @@
 //! Model selection: rollouts on episodes of their own choose among the policies along the way.
 
-use super::metrics::{EpochMetrics, HIL};
+use super::metrics::EpochMetrics;
 use crate::config::TrainSettings;
 use serde::{Deserialize, Serialize};
 
@@ -48,21 +48,14 @@ impl Selection {
 }
 
 fn is_candidate(row: &EpochMetrics, settings: &TrainSettings) -> bool {
-    let every = settings.select_every;
-    if row.epoch == row.epochs {
-        return true;
-    }
-    if row.stage == HIL {
-        return row.epoch.is_multiple_of(every);
-    }
-    let count = settings.epochs.div_ceil(every).max(1);
+    let count = settings.select_candidates;
     let passed = |epoch: u64| epoch * count / row.epochs;
     passed(row.epoch) > passed(row.epoch - 1)
 }
 
 #[cfg(test)]
 mod tests {
-    use super::super::metrics::WARM_START;
+    use super::super::metrics::HIL;
     use super::*;
 
     #[test]
@@ -74,17 +67,17 @@ mod tests {
     }
 
     #[test]
-    fn both_stages_offer_as_many_candidates_and_their_ends_are_among_them() {
-        let settings = TrainSettings { epochs: 25, select_every: 10, select_episodes: 1, ..Default::default() };
-        let epochs = |stage, epochs, settings: &TrainSettings| -> Vec<u64> {
-            let wanted = |e: &u64| Selection::default().wants(&EpochMetrics::new(stage, *e, epochs), settings);
+    fn candidates_are_evenly_spaced_and_the_end_is_one() {
+        let settings = TrainSettings { select_candidates: 3, select_episodes: 1, ..Default::default() };
+        let epochs = |epochs, settings: &TrainSettings| -> Vec<u64> {
+            let wanted = |e: &u64| Selection::default().wants(&EpochMetrics::new(HIL, *e, epochs), settings);
             (1..=epochs).filter(wanted).collect()
         };
-        assert_eq!(epochs(HIL, 25, &settings), [10, 20, 25]);
-        assert_eq!(epochs(WARM_START, 300, &settings), [100, 200, 300]);
-        assert_eq!(epochs(WARM_START, 2, &settings), [1, 2]);
-        assert_eq!(epochs(WARM_START, 300, &TrainSettings { epochs: 0, ..settings.clone() }), [300]);
-        assert_eq!(epochs(HIL, 25, &TrainSettings { select_episodes: 0, ..settings }), [] as [u64; 0]);
+        assert_eq!(epochs(25, &settings), [9, 17, 25]);
+        assert_eq!(epochs(300, &settings), [100, 200, 300]);
+        assert_eq!(epochs(2, &settings), [1, 2]);
+        assert_eq!(epochs(300, &TrainSettings { select_candidates: 1, ..settings.clone() }), [300]);
+        assert_eq!(epochs(25, &TrainSettings { select_episodes: 0, ..settings }), [] as [u64; 0]);
     }
 
     #[test]

@@ -23,6 +23,7 @@ fn quick() -> TrainSettings {
         warm_start_updates: 30,
         bc_batch: 64,
         epochs: 4,
+        min_updates: 0,
         batch: 4,
         ..Default::default()
     }
@@ -159,10 +160,17 @@ loss = "raw-sum"
 action = "sample"
 std_floor = 1e-3
 alpha_average = false
+alpha_max = 1.0
 rho = 0.6
 sc_pairs = "after-recovery"
+sc_mask_dq = false
+sc_knee = 0.0
+sc_balance = false
+sc_noise_variance = 0.0
+sc_pulses.probability = 0.0
 dynamics_learning_rate = 1e-3
 warm_start_updates = 0
+min_updates = 0
 epochs = 3
 batch = 1
 learning_rate = 1e-3

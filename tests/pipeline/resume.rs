@@ -76,7 +76,7 @@ fn interrupted_twice_training_ends_with_the_same_bytes() {
 #[test]
 fn a_killed_training_goes_on_from_the_last_checkpoint() {
     let (whole, run) = (Run::finished(), Run::finished());
-    let select = [&LONG[..], &["train.select_episodes=2", "train.select_every=200"]].concat();
+    let select = [&LONG[..], &["train.select_episodes=2", "train.select_candidates=3"]].concat();
     done(training(&whole, &select, &[]));
     let words = training(&run, &select, &["--checkpoint-every", "1"]);
     let output = stopped(words, "KILL", || run.at(CHECKPOINT).exists());
@@ -180,7 +180,7 @@ fn rho_and_alpha_out_of_range_are_named_as_they_were_typed() {
 #[test]
 fn the_selection_is_stated_in_the_weights() {
     let run = Run::finished();
-    let sets = ["train.select_episodes=2", "train.select_every=1", "train.epochs=2"];
+    let sets = ["train.select_episodes=2", "train.select_candidates=1000", "train.epochs=2"];
     for method in ["hil", "bc"] {
         done(training(&run, &sets, &["--method", method]));
         let meta = weights::read(&run.at("policy.safetensors"), "policy").expect("weights").1;

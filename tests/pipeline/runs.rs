@@ -12,13 +12,14 @@ pub const HILT: &str = env!("CARGO_BIN_EXE_hilt");
 /// The stages that write, in order.
 pub const STAGES: [&str; 6] = ["plan", "simulate", "convert", "pretrain", "train", "evaluate"];
 /// Settings of a run that takes a second.
-const TINY: [&str; 8] = [
+const TINY: [&str; 9] = [
     "plan.episodes=4",
     "pretrain.epochs=2",
     "pretrain.hidden_units=16",
     "train.hidden_units=16",
     "train.warm_start_updates=10",
     "train.epochs=1",
+    "train.min_updates=0",
     "evaluate.episodes=2",
     "evaluate.horizon_steps=40",
 ];
