@@ -4,16 +4,19 @@
 mod check;
 mod choices;
 mod data;
-mod learn;
+mod limits;
 mod load;
+mod pretrain;
 mod ranges;
 mod scene;
+mod train;
 
 pub use choices::{ActionChoice, Alpha, Convergence, FeatureSet, ModelLoss, Objective, Pairs, StateScale, Structure};
 pub use data::{ConvertSettings, EvaluateSettings};
-pub use learn::{PretrainSettings, TrainSettings};
 pub use load::{Preset, Source};
+pub use pretrain::PretrainSettings;
 pub use scene::{PlanSettings, PulseSettings, SceneSettings, SimulateSettings, Spread};
+pub use train::TrainSettings;
 
 use crate::error::{Error, Result};
 use crate::tasks::Task;

@@ -20,8 +20,8 @@ impl Controller for Replay<'_> {
     }
 }
 
-/// Runs the commands of `demo` from its start under disturbances drawn from `rng`, for as many steps as the demo has. Friction and mass are drawn anew and
-/// obstacles taken from the settings: a dataset does not hold them.
+/// Runs the commands of `demo` from its start under disturbances drawn from `rng`, for as many steps as the demo has. Friction and
+/// mass are drawn anew and obstacles taken from the settings: a dataset does not hold them.
 pub fn reexecute(index: u64, demo: &Demo, scene: &SceneSettings, settings: &SimulateSettings, mut rng: ChaCha8Rng) -> Episode {
     let start = State::from_row(demo.task(), demo.state(0)).expect("a demo's rows have its task's length");
     let scene = Scene {
@@ -35,4 +35,36 @@ pub fn reexecute(index: u64, demo: &Demo, scene: &SceneSettings, settings: &Simu
     let mut replay = Replay { commands: demo.actions().chunks_exact(JOINTS) };
     let steps = u32::try_from(demo.len()).unwrap_or(u32::MAX);
     run_episode(index, &scene, &mut replay, &mut Disturbance::new(settings, rng), steps)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::config::PulseSettings;
+    use crate::seed::stream;
+    use crate::sim::World;
+    use crate::tasks::{Task, draw_scene};
+
+    #[test]
+    fn commands_without_noise_lead_where_they_led_and_with_noise_elsewhere() {
+        let settings = SceneSettings::default();
+        let scene = draw_scene(Task::Stack, &settings, &mut stream(3, "scene", 0)).expect("there is room");
+        let mut world = World::new(&scene);
+        let mut states = world.observe().state.to_row();
+        let actions: Vec<f32> = (0..15).flat_map(|t| (0..JOINTS).map(move |i| 0.2 * ((t + i) as f32 / 3.0).sin())).collect();
+        for action in actions.chunks_exact(JOINTS) {
+            world.step(&std::array::from_fn(|i| f64::from(action[i])));
+            states.extend(world.observe().state.to_row());
+        }
+        let demo = Demo::new(Task::Stack, states, actions.clone(), actions).expect("lengths match");
+        let again = |noise_variance: f64| {
+            let off = PulseSettings { probability: 0.0, ..PulseSettings::default() };
+            let noise = SimulateSettings { noise_variance, pulses: off, ..SimulateSettings::default() };
+            let episode = reexecute(0, &demo, &settings, &noise, stream(4, "noise", 0));
+            let states = episode.to_demo().expect("a demo").states().to_vec();
+            states.iter().zip(demo.states()).map(|(a, b)| (a - b).abs()).fold(0.0f32, f32::max)
+        };
+        assert!(again(0.0) < 1e-5, "{}", again(0.0));
+        assert!(again(0.001) > 1e-3, "{}", again(0.001));
+    }
 }

@@ -1,81 +1,14 @@
-//! Settings of learning. Defaults are the preset `best`; the literal preset of the paper sets the keys that differ.
+//! Settings of the policy. Defaults are the preset `best`; the literal preset of the paper sets the keys that differ.
 
-use super::choices::{ActionChoice, Alpha, Convergence, FeatureSet, ModelLoss, Objective, Pairs, StateScale, Structure};
+use super::choices::{ActionChoice, Alpha, Convergence, FeatureSet, Objective, Pairs, StateScale};
+use super::limits::{at_least_one, network, optimiser, positive, pulses, refuse, unit};
 use super::scene::PulseSettings;
 use crate::error::{Error, Result};
 use crate::nn::Activation;
 use serde::{Deserialize, Serialize};
 
-/// `[pretrain]`: the dynamics network, Algorithm 4.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct PretrainSettings {
-    /// Activation of the hidden layers (paper: tanh in Figure 3, rectifier in 4.2).
-    pub activation: Activation,
-    /// Hidden layers (paper: 3).
-    pub hidden_layers: usize,
-    /// Units of a hidden layer (paper: 100).
-    pub hidden_units: usize,
-    /// What the network sees of the state; the action always comes with it.
-    pub features: FeatureSet,
-    /// What is known before learning: nothing, or that joints integrate their command.
-    pub structure: Structure,
-    /// The loss of Eq. 6.
-    pub loss: ModelLoss,
-    /// K: how often each demo's commands are executed again in the simulator, under new noise and the pulses below (Algorithm 4 executes
-    /// them). The dynamics network learns from them; the policy never sees them.
-    pub reexecute: u64,
-    /// Disturbance pulses of those executions.
-    pub reexecute_pulses: PulseSettings,
-    /// Epochs E over the demos.
-    pub epochs: u64,
-    /// Transitions per update, shuffled across demos; 0 = one whole demo per update, as Algorithm 4 has it.
-    pub batch_rows: usize,
-    /// Adam's learning rate at the first update (paper: 1e-3).
-    pub learning_rate: f64,
-    /// Learning rate at the last update, reached along half a cosine; the same value keeps it constant.
-    pub final_learning_rate: f64,
-    /// Largest norm of the gradient; 0 = no limit.
-    pub clip_norm: f64,
-    /// Decay of the average of the weights that is kept as the result; 0 = the last weights.
-    pub ema_decay: f64,
-}
-
-impl Default for PretrainSettings {
-    fn default() -> Self {
-        PretrainSettings {
-            activation: Activation::Tanh,
-            hidden_layers: 3,
-            hidden_units: 100,
-            features: FeatureSet::Fk,
-            structure: Structure::Kinematic,
-            loss: ModelLoss::StandardisedHuber,
-            reexecute: 0,
-            reexecute_pulses: PulseSettings { probability: 0.01, ..PulseSettings::default() },
-            epochs: 200,
-            batch_rows: 512,
-            learning_rate: 1e-3,
-            final_learning_rate: 1e-5,
-            clip_norm: 1.0,
-            ema_decay: 0.999,
-        }
-    }
-}
-
-impl PretrainSettings {
-    /// Checks every key.
-    ///
-    /// # Errors
-    /// [`Error::Usage`] names the key, its value and what is allowed.
-    pub fn validate(&self) -> Result<()> {
-        network("pretrain", self.hidden_layers, self.hidden_units)?;
-        at_least_one("pretrain.epochs", self.epochs)?;
-        pulses("pretrain.reexecute_pulses", &self.reexecute_pulses)?;
-        optimiser("pretrain", self.clip_norm, self.ema_decay)?;
-        positive("pretrain.learning_rate", self.learning_rate)?;
-        positive("pretrain.final_learning_rate", self.final_learning_rate)
-    }
-}
+/// As many as an evaluation may have.
+const MOST_EPISODES: u64 = 100_000;
 
 /// `[train]`: the policy, Algorithms 1-3.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -247,58 +180,4 @@ impl TrainSettings {
         }
         optimiser("train", self.clip_norm, self.ema_decay)
     }
-}
-
-fn refuse(key: &str, value: impl std::fmt::Display, allowed: &str) -> Result<()> {
-    Err(Error::Usage(format!("{key} = {value} is not allowed; it must be {allowed}")))
-}
-
-fn unit(key: &str, value: f64) -> Result<()> {
-    if (0.0..=1.0).contains(&value) { Ok(()) } else { refuse(key, value, "between 0 and 1") }
-}
-
-fn positive(key: &str, value: f64) -> Result<()> {
-    if value > 0.0 && value.is_finite() { Ok(()) } else { refuse(key, value, "above 0 and finite") }
-}
-
-fn at_least_one(key: &str, value: u64) -> Result<()> {
-    if value >= 1 { Ok(()) } else { refuse(key, value, "at least 1") }
-}
-
-/// Strongest pulse that is no slip of the finger \[rad/s\], several times what the joints can do.
-const MAX_PULSE_RAD_S: f64 = 10.0;
-
-fn pulses(key: &str, pulses: &PulseSettings) -> Result<()> {
-    unit(&format!("{key}.probability"), pulses.probability)?;
-    at_least_one(&format!("{key}.steps"), u64::from(pulses.steps))?;
-    match pulses.sigma_rad_s {
-        sigma if (0.0..=MAX_PULSE_RAD_S).contains(&sigma) => Ok(()),
-        sigma => refuse(&format!("{key}.sigma_rad_s"), sigma, &format!("from 0 to {MAX_PULSE_RAD_S}")),
-    }
-}
-
-/// Beyond these a network is a typing error.
-const MAX_LAYERS: usize = 16;
-const MAX_UNITS: usize = 4096;
-/// As many as an evaluation may have.
-const MOST_EPISODES: u64 = 100_000;
-
-fn network(stage: &str, layers: usize, units: usize) -> Result<()> {
-    if !(1..=MAX_LAYERS).contains(&layers) {
-        return refuse(&format!("{stage}.hidden_layers"), layers, &format!("from 1 to {MAX_LAYERS}"));
-    }
-    if !(1..=MAX_UNITS).contains(&units) {
-        return refuse(&format!("{stage}.hidden_units"), units, &format!("from 1 to {MAX_UNITS}"));
-    }
-    Ok(())
-}
-
-fn optimiser(stage: &str, clip_norm: f64, ema_decay: f64) -> Result<()> {
-    if !(clip_norm >= 0.0 && clip_norm.is_finite()) {
-        return refuse(&format!("{stage}.clip_norm"), clip_norm, "0 (no limit) or above");
-    }
-    if !(0.0..1.0).contains(&ema_decay) {
-        return refuse(&format!("{stage}.ema_decay"), ema_decay, "at least 0 and below 1");
-    }
-    Ok(())
 }

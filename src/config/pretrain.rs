@@ -1,0 +1,85 @@
+//! Settings of the dynamics network. Defaults are the preset `best`.
+
+use super::choices::{FeatureSet, ModelLoss, Structure};
+use super::limits::{at_least_one, network, optimiser, positive, pulses, refuse};
+use super::scene::PulseSettings;
+use crate::error::Result;
+use crate::nn::Activation;
+use serde::{Deserialize, Serialize};
+
+/// More executions of each demo than any dynamics network needs.
+const MOST_EXECUTIONS: u64 = 1000;
+
+/// `[pretrain]`: the dynamics network, Algorithm 4.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct PretrainSettings {
+    /// Activation of the hidden layers (paper: tanh in Figure 3, rectifier in 4.2).
+    pub activation: Activation,
+    /// Hidden layers (paper: 3).
+    pub hidden_layers: usize,
+    /// Units of a hidden layer (paper: 100).
+    pub hidden_units: usize,
+    /// What the network sees of the state; the action always comes with it.
+    pub features: FeatureSet,
+    /// What is known before learning: nothing, or that joints integrate their command.
+    pub structure: Structure,
+    /// The loss of Eq. 6.
+    pub loss: ModelLoss,
+    /// K: how often each demo's commands are executed again in the simulator, under new noise and the pulses below (Algorithm 4 executes
+    /// them). The dynamics network learns from them; the policy never sees them.
+    pub reexecute: u64,
+    /// Disturbance pulses of those executions.
+    pub reexecute_pulses: PulseSettings,
+    /// Epochs E over the demos.
+    pub epochs: u64,
+    /// Transitions per update, shuffled across demos; 0 = one whole demo per update, as Algorithm 4 has it.
+    pub batch_rows: usize,
+    /// Adam's learning rate at the first update (paper: 1e-3).
+    pub learning_rate: f64,
+    /// Learning rate at the last update, reached along half a cosine; the same value keeps it constant.
+    pub final_learning_rate: f64,
+    /// Largest norm of the gradient; 0 = no limit.
+    pub clip_norm: f64,
+    /// Decay of the average of the weights that is kept as the result; 0 = the last weights.
+    pub ema_decay: f64,
+}
+
+impl Default for PretrainSettings {
+    fn default() -> Self {
+        PretrainSettings {
+            activation: Activation::Tanh,
+            hidden_layers: 3,
+            hidden_units: 100,
+            features: FeatureSet::Fk,
+            structure: Structure::Kinematic,
+            loss: ModelLoss::StandardisedHuber,
+            reexecute: 0,
+            reexecute_pulses: PulseSettings { probability: 0.01, ..PulseSettings::default() },
+            epochs: 200,
+            batch_rows: 512,
+            learning_rate: 1e-3,
+            final_learning_rate: 1e-5,
+            clip_norm: 1.0,
+            ema_decay: 0.999,
+        }
+    }
+}
+
+impl PretrainSettings {
+    /// Checks every key.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] names the key, its value and what is allowed.
+    pub fn validate(&self) -> Result<()> {
+        network("pretrain", self.hidden_layers, self.hidden_units)?;
+        at_least_one("pretrain.epochs", self.epochs)?;
+        if self.reexecute > MOST_EXECUTIONS {
+            return refuse("pretrain.reexecute", self.reexecute, &format!("from 0 to {MOST_EXECUTIONS}"));
+        }
+        pulses("pretrain.reexecute_pulses", &self.reexecute_pulses)?;
+        optimiser("pretrain", self.clip_norm, self.ema_decay)?;
+        positive("pretrain.learning_rate", self.learning_rate)?;
+        positive("pretrain.final_learning_rate", self.final_learning_rate)
+    }
+}
