@@ -69,7 +69,7 @@ fn update(learner: &mut Learner, i: usize, rows: &mut Vec<usize>) {
     learner.rows_of(&demos, rows);
     learner.behavior_cloning(rows, BATCH as f64).expect("finite");
     learner.state_cloning(&demos, rows).expect("finite");
-    learner.update(0.5, 1e-5);
+    learner.update(0.5, 1.0, 1e-5);
     learner.fine_tune(rows).expect("finite");
 }
 

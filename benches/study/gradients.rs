@@ -68,14 +68,12 @@ fn look(path: &Path, dynamics: &Dynamics, sums: &mut [[Products; PAIRS.len()]]) 
     let (episode, _) = recording::read(path)?;
     let mut world = World::new(&episode.scene);
     for (t, step) in episode.steps.iter().enumerate() {
-        if t % STRIDE == 0 && t + STEPS < episode.steps.len() {
-            if let Some(phase) = step.phase {
-                let start = world.snapshot();
-                for joint in 0..JOINTS {
-                    let network = answer(joint, &step.executed, |action| Ok(predicted(dynamics, &episode, t, action)))?;
-                    let simulator = answer(joint, &step.executed, |action| simulated(&start, &episode, t, action))?;
-                    add(&mut sums[phase as usize], joint, &network, &simulator);
-                }
+        if let (true, Some(phase)) = (t % STRIDE == 0 && t + STEPS < episode.steps.len(), step.phase) {
+            let start = world.snapshot();
+            for joint in 0..JOINTS {
+                let network = answer(joint, &step.executed, |action| Ok(predicted(dynamics, &episode, t, action)))?;
+                let simulator = answer(joint, &step.executed, |action| simulated(&start, &episode, t, action))?;
+                add(&mut sums[phase as usize], joint, &network, &simulator);
             }
         }
         world.step(&step.executed);
