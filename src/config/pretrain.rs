@@ -70,7 +70,7 @@ impl PretrainSettings {
     /// Checks every key.
     ///
     /// # Errors
-    /// [`Error::Usage`] names the key, its value and what is allowed.
+    /// [`crate::error::Error::Usage`] names the key, its value and what is allowed.
     pub fn validate(&self) -> Result<()> {
         network("pretrain", self.hidden_layers, self.hidden_units)?;
         at_least_one("pretrain.epochs", self.epochs)?;

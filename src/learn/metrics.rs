@@ -39,7 +39,7 @@ pub struct ActionError {
 /// One epoch. What was not computed is NaN.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct EpochMetrics {
-    /// One of [`STAGES`].
+    /// One of `STAGES`.
     #[serde(deserialize_with = "known_stage")]
     pub stage: StageName,
     /// Epoch of the stage, from 1.

@@ -1,5 +1,5 @@
 //! The arithmetic that a network spends its time in: one kernel for all matrix products, which ends with the activation, and what moves
-//! samples into lanes. Each is written once over a [`vector`] of eight floats and compiled twice, for AVX2 with FMA and for any
+//! samples into lanes. Each is written once over a `vector` of eight floats and compiled twice, for AVX2 with FMA and for any
 //! processor; which one runs is found out at run time. Results differ in their last bits between the two, never between runs on one
 //! processor. All `unsafe` code of the library stands in this directory.
 
