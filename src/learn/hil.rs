@@ -131,14 +131,15 @@ fn hybrid_imitation_learning(run: &mut Run, alpha: Alpha, settings: &TrainSettin
             let cloned = learner.behavior_cloning(&rows, demos.len() as f64)?; // Algorithm 2, Eq. 3-4
             let alpha = mixing.weight(cloned.d_conv); // alpha_e = d_conv, no gradient through it
             let sc = if alpha > 0.0 { learner.state_cloning(demos, &rows)? } else { f64::NAN }; // Algorithm 3, Eq. 5
-            let mixed = if alpha > 0.0 { (1.0 - alpha) * cloned.l_bc + alpha * sc } else { cloned.l_bc }; // Eq. 1
             if i == 0 {
                 (metrics.grad_bc, metrics.grad_sc) = learner.gradient_norms(alpha > 0.0);
                 mixing.see_norms(metrics.grad_bc, metrics.grad_sc);
             }
+            let scale = mixing.sc_scale();
+            let mixed = if alpha > 0.0 { (1.0 - alpha) * cloned.l_bc + alpha * scale * sc } else { cloned.l_bc }; // Eq. 1
             let step = epoch * per_epoch + i as u64;
             let rate = cosine(settings.learning_rate, settings.final_learning_rate, step, epochs * per_epoch);
-            learner.update(alpha, mixing.sc_scale(), rate); // Eq. 2
+            learner.update(alpha, scale, rate); // Eq. 2
             if settings.fine_tune_dynamics && mixing.alpha != Alpha::Fixed(0.0) {
                 l_model.add(learner.fine_tune(&rows)?); // Eq. 6, on observed transitions only
             }

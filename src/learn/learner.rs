@@ -226,12 +226,13 @@ impl Learner {
     /// theta <- theta - grad L_mix, by Adam. An update whose gradient is not finite (long rollouts without recovery) is left out.
     pub fn update(&mut self, alpha: f64, sc_scale: f64, learning_rate: f64) {
         self.updates += 1;
-        self.mixed_gradient((1.0 - alpha) as f32, (alpha * sc_scale) as f32);
+        let (bc_weight, sc_weight) = ((1.0 - alpha) as f32, (alpha * sc_scale) as f32);
+        self.mixed_gradient(bc_weight, sc_weight);
         let norm = clip_by_global_norm(&mut self.gradient, self.settings.clip_norm);
         let mut d_log_std = self.bc_work.d_log_std;
         if self.settings.action == ActionChoice::Sample {
             let sc = if alpha > 0.0 { self.sc_work.d_log_std } else { Default::default() };
-            d_log_std = std::array::from_fn(|i| (1.0 - alpha) as f32 * d_log_std[i] + alpha as f32 * sc[i]);
+            d_log_std = std::array::from_fn(|i| bc_weight * d_log_std[i] + sc_weight * sc[i]);
         }
         let too_long = self.settings.clip_norm == 0.0 && norm > LARGEST_NORM;
         if !norm.is_finite() || too_long || !d_log_std.iter().all(|d| f64::from(d.abs()) <= LARGEST_NORM) {

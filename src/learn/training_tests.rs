@@ -1,8 +1,8 @@
 //! Training from end to end on toy demos.
 
 use super::testing::{demo, demos};
-use super::{Dynamics, Hooks, Method, Policy, Trained, pretrain_dynamics, train};
-use crate::config::{Alpha, PretrainSettings, TrainSettings};
+use super::{Dynamics, Hooks, Learner, Method, Policy, Trained, pretrain_dynamics, train};
+use crate::config::{ActionChoice, Alpha, PretrainSettings, TrainSettings};
 use crate::demo::Demo;
 use crate::error::{Error, Result};
 use crate::interrupt::Interrupt;
@@ -48,6 +48,26 @@ fn pure_cloning_is_the_loop_with_alpha_at_its_ends() {
     assert_eq!(bytes(&run(Method::Bc, &quick(), None).expect("needs no dynamics").policy), bc);
     assert_eq!(policy(Method::Hil, &fixed(1.0, 0)), policy(Method::Sc, &quick()));
     assert_ne!(policy(Method::Hil, &fixed(0.5, 30)), bc);
+}
+
+#[test]
+fn the_scale_of_l_sc_reaches_the_spread_of_the_policy_too() {
+    let settings = TrainSettings { action: ActionChoice::Sample, ..quick() };
+    let (train, held_out) = (demos(Task::Stack, 8, 30, 0), demos(Task::Stack, 2, 30, 100));
+    let log_std = |sc_scale: f64| {
+        let dynamics = pretrain(Task::Stack, 1).0;
+        let mut learner = Learner::new(&train, &held_out, Some(dynamics), &settings, 7).expect("the demos are sound");
+        let mut rows = Vec::new();
+        learner.rows_of(&[0, 1], &mut rows);
+        learner.behavior_cloning(&rows, 2.0).expect("finite");
+        learner.state_cloning(&[0, 1], &rows).expect("finite");
+        learner.update(0.5, sc_scale, 1e-2);
+        learner.policy.log_std.clone()
+    };
+    // Adam's first step has the gradient's sign alone, and the sign of a large scale is L_SC's
+    for (up, down) in log_std(1e6).iter().zip(log_std(-1e6)) {
+        assert!((up - down).abs() > 1e-2, "the spread went the same way, to {up} and {down}");
+    }
 }
 
 #[test]
