@@ -11,6 +11,7 @@ pub mod interrupt;
 pub mod learn;
 pub mod nn;
 pub mod plan;
+pub mod pulse;
 pub mod report;
 pub mod robot;
 pub mod scene;

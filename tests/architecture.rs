@@ -5,7 +5,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// What any module may use: contracts, errors, randomness, settings.
-const EVERYWHERE: [&str; 9] = ["config", "demo", "error", "interrupt", "scene", "seed", "state", "table", "tensor"];
+const EVERYWHERE: [&str; 10] = ["config", "demo", "error", "interrupt", "pulse", "scene", "seed", "state", "table", "tensor"];
 
 /// What else each module may use. A module that is not here is refused, so that a new one gets its place on purpose.
 const FLOW: [(&str, &[&str]); 17] = [

@@ -1,7 +1,9 @@
 //! What is allowed for the numbers of `[pretrain]` and `[train]`.
 
+use super::ranges::Range;
 use super::scene::PulseSettings;
 use crate::error::{Error, Result};
+use toml::Value;
 
 pub(super) fn refuse(key: &str, value: impl std::fmt::Display, allowed: &str) -> Result<()> {
     Err(Error::Usage(format!("{key} = {value} is not allowed; it must be {allowed}")))
@@ -19,16 +21,15 @@ pub(super) fn at_least_one(key: &str, value: u64) -> Result<()> {
     if value >= 1 { Ok(()) } else { refuse(key, value, "at least 1") }
 }
 
-/// Strongest pulse that is no slip of the finger \[rad/s\], several times what the joints can do.
-const MAX_PULSE_RAD_S: f64 = 10.0;
-
+/// Pulses have the ranges of `[simulate.pulses]`, wherever they stand.
 pub(super) fn pulses(key: &str, pulses: &PulseSettings) -> Result<()> {
-    unit(&format!("{key}.probability"), pulses.probability)?;
-    at_least_one(&format!("{key}.steps"), u64::from(pulses.steps))?;
-    match pulses.sigma_rad_s {
-        sigma if (0.0..=MAX_PULSE_RAD_S).contains(&sigma) => Ok(()),
-        sigma => refuse(&format!("{key}.sigma_rad_s"), sigma, &format!("from 0 to {MAX_PULSE_RAD_S}")),
-    }
+    let PulseSettings { probability, steps, sigma_rad_s } = pulses;
+    let entries =
+        [("probability", Value::from(*probability)), ("steps", i64::from(*steps).into()), ("sigma_rad_s", (*sigma_rad_s).into())];
+    entries.iter().try_for_each(|(name, value)| {
+        let range = Range::of(&format!("simulate.pulses.{name}")).expect("every number of a pulse has a range");
+        range.check(&format!("{key}.{name}"), value).map_err(Error::Usage)
+    })
 }
 
 /// Beyond these a network is a typing error.

@@ -25,7 +25,7 @@ const fn above(key: &'static str, low: f64, high: f64) -> Range {
 /// The arm reaches 0.98 m; nothing that matters lies beyond this \[m\].
 const WORKSPACE_M: f64 = 2.0;
 /// More episodes than any experiment needs, few enough to fit in memory and in five-digit file names.
-const MOST_EPISODES: f64 = 100_000.0;
+pub(super) const MOST_EPISODES: f64 = 100_000.0;
 /// A run of 500 s; keeps a slip of the finger from allocating all memory.
 const MOST_STEPS: f64 = 10_000.0;
 

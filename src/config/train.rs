@@ -2,13 +2,11 @@
 
 use super::choices::{ActionChoice, Alpha, Convergence, FeatureSet, Objective, Pairs, StateScale};
 use super::limits::{at_least_one, network, optimiser, positive, pulses, refuse, unit};
+use super::ranges::MOST_EPISODES;
 use super::scene::PulseSettings;
 use crate::error::{Error, Result};
 use crate::nn::Activation;
 use serde::{Deserialize, Serialize};
-
-/// As many as an evaluation may have.
-const MOST_EPISODES: u64 = 100_000;
 
 /// `[train]`: the policy, Algorithms 1-3.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -172,7 +170,7 @@ impl TrainSettings {
         at_least_one("train.batch", self.batch as u64)?;
         at_least_one("train.bc_batch", self.bc_batch as u64)?;
         at_least_one("train.select_candidates", self.select_candidates)?;
-        if self.select_episodes > MOST_EPISODES {
+        if self.select_episodes as f64 > MOST_EPISODES {
             return refuse("train.select_episodes", self.select_episodes, &format!("from 0 to {MOST_EPISODES}"));
         }
         if self.epochs == 0 && self.warm_start_updates == 0 {

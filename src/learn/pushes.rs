@@ -1,8 +1,9 @@
 //! Disturbances of the rollouts of Algorithm 3: the policy is pushed off its path in the dynamics network, and L_SC asks it back.
 
 use crate::config::{PulseSettings, TrainSettings};
-use crate::state::{ARM_JOINTS, JOINTS};
-use rand::{Rng, RngExt};
+use crate::pulse::Pulse;
+use crate::state::JOINTS;
+use rand::Rng;
 use rand_distr::{Distribution, StandardNormal};
 
 /// Noise and pulses as in the simulator (`sim::Disturbance`), for all steps of an update at once.
@@ -26,17 +27,12 @@ impl Pushes {
             return;
         }
         for length in lengths {
-            let (mut left, mut pulse) = (0, [0.0f32; ARM_JOINTS]);
+            let mut pulse = Pulse::default();
             for _ in 0..length {
-                if left == 0 {
-                    let begins = rng.random::<f64>() < self.pulses.probability;
-                    left = if begins { self.pulses.steps } else { 1 };
-                    let sigma = if begins { self.pulses.sigma_rad_s as f32 } else { 0.0 };
-                    pulse = std::array::from_fn(|_| if begins { sigma * normal(rng) } else { 0.0 });
-                }
-                left -= 1;
-                let sigma = self.sigma_rad_s;
-                self.rows.extend((0..JOINTS).map(|i| sigma * normal(rng) + pulse.get(i).copied().unwrap_or(0.0)));
+                let unit = pulse.advance(&self.pulses, rng);
+                let (sigma, pulse_sigma) = (self.sigma_rad_s, self.pulses.sigma_rad_s as f32);
+                let push = |i: usize| unit.get(i).map_or(0.0, |unit| pulse_sigma * *unit as f32);
+                self.rows.extend((0..JOINTS).map(|i| sigma * normal(rng) + push(i)));
             }
         }
     }
@@ -55,6 +51,7 @@ fn normal(rng: &mut impl Rng) -> f32 {
 mod tests {
     use super::*;
     use crate::seed::stream;
+    use crate::state::ARM_JOINTS;
 
     fn drawn(settings: &TrainSettings, lengths: &[usize]) -> Vec<f32> {
         let mut pushes = Pushes::new(settings, 10);

@@ -98,22 +98,27 @@ impl Shard {
         let mut sum = Lanes::default();
         for ((d, output), weight) in d_output.iter_mut().zip(output).zip(loss.weights) {
             let error = *output - *d;
-            // Huber's function is a parabola up to the knee, and a line from there
-            let knee = if loss.huber { HUBER_KNEE } else { f32::INFINITY };
-            let bent = error.map(|e| {
-                if e > knee {
-                    knee
-                } else if e < -knee {
-                    -knee
-                } else {
-                    e
-                }
-            });
+            let bent = bend(error, if loss.huber { HUBER_KNEE } else { f32::INFINITY });
             sum += bent * (error * 2.0 - bent) * *weight;
             *d = bent * (2.0 * loss.scale * weight);
         }
         self.loss += sum.0.iter().map(|sum| f64::from(loss.scale * sum)).sum::<f64>();
     }
+}
+
+/// Huber's function is a parabola up to `knee`, and its tangent from there: half its derivative, from which the function itself is
+/// bent (2 error - bent).
+#[inline]
+pub(super) fn bend(error: Lanes, knee: f32) -> Lanes {
+    error.map(|e| {
+        if e > knee {
+            knee
+        } else if e < -knee {
+            -knee
+        } else {
+            e
+        }
+    })
 }
 
 #[cfg(test)]

@@ -8,6 +8,7 @@ use super::corpus::row;
 use super::dynamics::{DT_S, Dynamics};
 use super::hand::Hand;
 use super::policy::Policy;
+use super::regression::bend;
 use super::state_cloning::{Batch, Choices, Segment};
 use crate::config::{ActionChoice, Structure};
 use crate::nn::{LANES, Lanes, Panels, Pass, kernel, panels_of};
@@ -249,9 +250,8 @@ impl Rollout {
         let mut loss = Lanes::default();
         for (k, prediction) in self.predictions.panel(at).iter().enumerate() {
             let (error, weight) = (*prediction - targets[k], choices.weights[k]);
-            // Huber's function is a parabola up to the knee, and a line from there
             let knee = if weight > 0.0 { choices.knee / weight.sqrt() } else { f32::INFINITY };
-            let bent = error.map(|e| e.max(-knee).min(knee));
+            let bent = bend(error, knee);
             loss += bent * (error * 2.0 - bent) * weight;
             d_state[k] += bent * (2.0 * scale * weight);
             d_output[k] = d_state[k] * dynamics.residual_scaling().std[k];

@@ -1,9 +1,9 @@
 //! What stands between command and motor: Gaussian noise, and pulses that push the arm off its way.
 
 use crate::config::SimulateSettings;
+use crate::pulse::Pulse;
 use crate::robot::VELOCITY_LIMITS_RAD_S;
-use crate::state::{ARM_JOINTS, Action};
-use rand::RngExt;
+use crate::state::Action;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
@@ -12,40 +12,24 @@ use rand_distr::{Distribution, StandardNormal};
 pub struct Disturbance {
     settings: SimulateSettings,
     rng: ChaCha8Rng,
-    /// Extra velocity of the running pulse on the arm's joints \[rad/s\].
-    pulse_rad_s: [f64; ARM_JOINTS],
-    /// Control steps that the pulse still lasts.
-    pulse_left: u32,
+    pulse: Pulse,
 }
 
 impl Disturbance {
     /// Noise and pulses of one episode, drawn from `rng`.
     pub fn new(settings: &SimulateSettings, rng: ChaCha8Rng) -> Self {
-        Disturbance { settings: settings.clone(), rng, pulse_rad_s: [0.0; ARM_JOINTS], pulse_left: 0 }
+        Disturbance { settings: settings.clone(), rng, pulse: Pulse::default() }
     }
 
     /// Executed action \[rad/s\]: commanded + N(0, `noise_variance`) on all nine joints + the pulse on the arm, clamped to the joints'
     /// velocity limits and rounded to f32.
     pub fn apply(&mut self, commanded: &Action) -> Action {
         let sigma = self.settings.noise_variance.sqrt();
-        self.advance_pulse();
+        let unit = self.pulse.advance(&self.settings.pulses, &mut self.rng);
         std::array::from_fn(|i| {
-            let pulse = if i < ARM_JOINTS { self.pulse_rad_s[i] } else { 0.0 };
+            let pulse = unit.get(i).map_or(0.0, |unit| self.settings.pulses.sigma_rad_s * unit);
             clamp(commanded[i] + sigma * self.normal() + pulse, i)
         })
-    }
-
-    fn advance_pulse(&mut self) {
-        let pulses = &self.settings.pulses;
-        let (probability, sigma) = (pulses.probability, pulses.sigma_rad_s);
-        if self.pulse_left > 0 {
-            self.pulse_left -= 1;
-        }
-        if self.pulse_left == 0 {
-            let begins = probability > 0.0 && self.rng.random::<f64>() < probability;
-            self.pulse_left = if begins { pulses.steps } else { 0 };
-            self.pulse_rad_s = std::array::from_fn(|_| if begins { sigma * self.normal() } else { 0.0 });
-        }
     }
 
     fn normal(&mut self) -> f64 {
