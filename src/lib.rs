@@ -1,4 +1,37 @@
 //! hilt: hybrid imitation learning for robot manipulation, from a task's name to an evaluated policy.
+//!
+//! It implements Jung & Kim, *Hybrid Imitation Learning Framework for Robotic Manipulation Tasks*, Sensors 2021 (the paper). Every
+//! stage of the pipeline is a command (`hilt help`) over the functions of this library.
+//!
+//! # The paper's ideas, and where they are
+//!
+//! | paper | here | what it is |
+//! |---|---|---|
+//! | s_t, a_t | [`state`] | state of 25 to 32 numbers (rad, rad/s, m, quaternions x y z w); nine joint velocities \[rad/s\] |
+//! | d = <(s_t^E, a_t^E)> | [`demo::Demo`] | a demonstration: T + 1 states, T actions |
+//! | pi_theta | [`learn::Policy`] | Gaussian: mean network, log standard deviations |
+//! | f_phi | [`learn::Dynamics`] | the next state from a state and an action |
+//! | Algorithm 1: HIL; Eq. 1: L_mix | [`learn::hil`] | BC and SC mixed by alpha, with its warm start; pure BC and SC are the same loop |
+//! | Eq. 2: the update of theta | [`learn::Learner::update`] | Adam on the gradient of L_mix |
+//! | Algorithm 2: BC; Eq. 3: L_BC; Eq. 4: p_t, d_conv | [`learn::behavior_cloning`] | loss on the demos' states, degree of policy convergence |
+//! | Algorithm 3: SC; Eq. 5: L_SC; rho | [`learn::state_cloning`] | rollouts in f_phi, stochastic recovery, gradient through time |
+//! | Algorithm 4; Eq. 6: L_model | [`mod@learn::pretrain_dynamics`] | pretraining of f_phi; [`learn::Learner::fine_tune`] goes on with it |
+//! | N(0, .001) on actions | [`sim`] | noise while demos are recorded and policies evaluated |
+//! | tasks, milestones, success | [`tasks`] | pick-up, pick-and-place, stack: one file each |
+//! | success rates | [`eval`] | seeded rollouts, Wilson intervals, failures by class |
+//! | rho, alpha, tau, ... | [`config`] | every choice is a key; `pipelines/paper` sets them as literally as can work |
+//!
+//! # The modules, in the order in which data flow
+//!
+//! A module imports only from those before it; `tests/architecture.rs` holds this, and which modules see which.
+//!
+//! - contracts that all may use: [`state`], [`demo`], [`scene`], [`config`], [`pulse`], [`table`], [`tensor`], [`error`], [`seed`],
+//!   [`interrupt`]
+//! - [`tasks`], [`robot`], then [`plan`] (scene to demonstration) and [`sim`] (contact physics, the only home of rapier)
+//! - [`data`]: files, the only home of MCAP, Arrow, Parquet and safetensors; knows no learning
+//! - [`nn`] (networks and their engine, knows no robots), then [`learn`] (the method, knows neither files nor simulator)
+//! - [`eval`]: policies in the simulator; [`report`]: pictures, charts, tables
+//! - [`cmd`]: the command line
 #![warn(missing_docs)]
 
 pub mod cmd;
