@@ -11,6 +11,7 @@ use hilt::learn::{Learner, pretrain_dynamics};
 use hilt::robot::READY_Q_RAD;
 use hilt::state::{CONTROL_DT_S, JOINTS};
 use hilt::tasks::Task;
+use std::collections::HashMap;
 use std::time::{Duration, Instant};
 
 const STEPS: usize = 150;
@@ -97,26 +98,42 @@ fn multiply_add_fused(factor: f32, rounds: usize) -> f32 {
 /// Repetitions whose fastest is compared with the peak: other programs only ever slow it down.
 const REPETITIONS: usize = 60;
 
-/// Prints how close to `threads` cores' peak the fastest repetition of `work` comes; it returns its operations.
-fn report(name: &str, threads: usize, peak: f64, mut work: impl FnMut() -> u64) {
-    let once = |_| {
-        let start = Instant::now();
-        let flops = work();
-        (start.elapsed().as_secs_f64(), flops as f64)
-    };
-    let (seconds, flops) = (0..REPETITIONS).map(once).max_by(|a, b| (a.1 / a.0).total_cmp(&(b.1 / b.0))).expect("repetitions");
-    let rate = flops / seconds;
-    println!(
-        "{name}/threads{threads}: {:.2} ms, {:.1} GFLOP/s in matrix products, {:.0} % of {:.1}",
-        1e3 * seconds,
-        rate / 1e9,
-        100.0 * rate / (peak * threads as f64),
-        peak * threads as f64 / 1e9
-    );
+/// What a repetition is compared with.
+#[derive(Default)]
+struct Yardstick {
+    /// Most operations per second of one core seen so far: a slow minute must not flatter what is measured in it.
+    peak: f64,
+    /// Operations per second of each work on the first number of threads.
+    rates: HashMap<String, f64>,
+}
+
+impl Yardstick {
+    /// Prints how close to `threads` cores' peak the fastest repetition of `work` comes, which returns its operations, and how much
+    /// faster it is than on the first number of threads.
+    fn report(&mut self, name: &str, threads: usize, mut work: impl FnMut() -> u64) {
+        self.peak = self.peak.max(peak_flops());
+        let once = |_| {
+            let start = Instant::now();
+            let flops = work();
+            (start.elapsed().as_secs_f64(), flops as f64)
+        };
+        let repetitions = (0..REPETITIONS).map(once);
+        let (seconds, flops) = repetitions.max_by(|a, b| (a.1 / a.0).total_cmp(&(b.1 / b.0))).expect("repetitions");
+        let rate = flops / seconds;
+        let gain = rate / *self.rates.entry(name.into()).or_insert(rate);
+        let peak = self.peak * threads as f64;
+        println!(
+            "{name}/threads{threads}: {:.2} ms, {:.1} GFLOP/s in matrix products, {:.0} % of {:.1}, {gain:.2} times one thread",
+            1e3 * seconds,
+            rate / 1e9,
+            100.0 * rate / peak,
+            peak / 1e9
+        );
+    }
 }
 
 fn updates(criterion: &mut Criterion) {
-    let peak = peak_flops();
+    let mut yardstick = Yardstick::default();
     for threads in [1, 2] {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads start");
         let mut learner = learner();
@@ -126,7 +143,7 @@ fn updates(criterion: &mut Criterion) {
             let mut rows = Vec::new();
             learner.rows_of(&demos, &mut rows);
             pool.install(|| {
-                report(&format!("hil_update/B{size}"), threads, peak, || {
+                yardstick.report(&format!("hil_update/B{size}"), threads, || {
                     hil_update(&mut learner, &demos, &rows);
                     // the segments, drawn anew every time, decide how many first steps behavior cloning has already done
                     learner.flops_per_update(rows.len() as u64, learner.segments().len() as u64)
@@ -145,7 +162,7 @@ fn updates(criterion: &mut Criterion) {
             learner.bc_flops_per_update(rows.len() as u64)
         };
         let mut group = criterion.benchmark_group("bc_update");
-        pool.install(|| report("bc_update/512", threads, peak, &mut bc_update));
+        pool.install(|| yardstick.report("bc_update/512", threads, &mut bc_update));
         group.throughput(Throughput::Elements(rows.len() as u64)); // state-action pairs
         group.bench_function(format!("512/threads{threads}"), |bencher| pool.install(|| bencher.iter(&mut bc_update)));
         group.finish();

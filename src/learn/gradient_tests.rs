@@ -245,9 +245,10 @@ fn step_by_step(world: &World, gradient: &mut [f32]) -> f64 {
             for k in (0..BASE_DIM).filter(|_| counts) {
                 let error = prediction[k].0[0] - target[k];
                 let (weight, size) = (choices.weights[k], error.abs() * choices.weights[k].sqrt());
-                let over = (size - choices.knee).max(0.0); // squared error up to the knee, its tangent from there
+                let knee = if settings.sc_knee > 0.0 { settings.sc_knee as f32 } else { f32::INFINITY };
+                let over = (size - knee).max(0.0); // squared error up to the knee, its tangent from there
                 l_sc += f64::from(scale * (size * size - over * over));
-                d_prediction[k] = first_lane(2.0 * scale * weight.sqrt() * size.min(choices.knee) * error.signum());
+                d_prediction[k] = first_lane(2.0 * scale * weight.sqrt() * size.min(knee) * error.signum());
             }
             if coin {
                 prediction[..BASE_DIM].copy_from_slice(&splat(target));

@@ -81,7 +81,9 @@ impl Rollout {
         self.states.provide(dynamics.task().state_dim(), panels);
         self.predictions.provide(BASE_DIM, panels);
         self.d_states.provide(BASE_DIM, first);
-        [&mut self.actions, &mut self.noise, &mut self.d_first].into_iter().for_each(|array| array.provide(JOINTS, first));
+        [&mut self.actions, &mut self.noise, &mut self.pushes, &mut self.d_first]
+            .into_iter()
+            .for_each(|array| array.provide(JOINTS, first));
         self.hands.reserve(panels.saturating_sub(self.hands.len()));
         self.segments.clear();
         self.segments.reserve(rows);
@@ -178,21 +180,20 @@ impl Rollout {
     }
 
     /// The actions of this depth \[rad/s\].
-    fn act(&mut self, depth: Depth, policy: &Policy, batch: Batch, choices: &Choices) {
+    fn act<'a>(&mut self, depth: Depth, policy: &Policy, batch: Batch<'a>, choices: &Choices) {
         let (sampled, pushed) = (choices.action == ActionChoice::Sample, !batch.pushes.is_empty());
+        let segments = &self.segments;
+        let of_step = |rows: &'a [f32]| move |i: usize| row(rows, JOINTS, segments[i].start + depth.j);
+        if depth.j == 0 {
+            self.actions.write_rows(0, depth.count, of_step(batch.mean));
+        }
+        if sampled {
+            self.noise.write_rows(0, depth.count, of_step(batch.noise));
+        }
+        if pushed {
+            self.pushes.write_rows(0, depth.count, of_step(batch.pushes));
+        }
         for (p, _, later) in depth.places() {
-            for i in depth.segments(p) {
-                let transition = self.segments[i].start + depth.j;
-                if depth.j == 0 {
-                    self.actions.write_row(i, row(batch.mean, JOINTS, transition));
-                }
-                if sampled {
-                    self.noise.write_row(i, row(batch.noise, JOINTS, transition));
-                }
-                if pushed {
-                    self.pushes.write_row(i, row(batch.pushes, JOINTS, transition));
-                }
-            }
             if depth.j > 0 {
                 self.actions.panel_mut(p).copy_from_slice(self.policy.output.panel(later));
             }
@@ -214,9 +215,7 @@ impl Rollout {
         for (p, at, _) in depth.places() {
             self.add_loss(depth, p, at, dynamics, batch, choices);
         }
-        let all = depth.from..depth.from + depth.panels;
-        dynamics.net.backward(&mut self.model, all.clone());
-        dynamics.net.backward_input(&mut self.model, all);
+        dynamics.net.backward_through(&mut self.model, depth.from..depth.from + depth.panels);
         self.retrace_actions(depth, policy, dynamics, batch, choices);
         if depth.j == 0 {
             return;
@@ -250,8 +249,7 @@ impl Rollout {
         let mut loss = Lanes::default();
         for (k, prediction) in self.predictions.panel(at).iter().enumerate() {
             let (error, weight) = (*prediction - targets[k], choices.weights[k]);
-            let knee = if weight > 0.0 { choices.knee / weight.sqrt() } else { f32::INFINITY };
-            let bent = bend(error, knee);
+            let bent = bend(error, choices.knees[k]);
             loss += bent * (error * 2.0 - bent) * weight;
             d_state[k] += bent * (2.0 * scale * weight);
             d_output[k] = d_state[k] * dynamics.residual_scaling().std[k];
@@ -263,12 +261,11 @@ impl Rollout {
     fn retrace_actions(&mut self, depth: Depth, policy: &Policy, dynamics: &Dynamics, batch: Batch, choices: &Choices) {
         let seen = dynamics.features().width();
         let kinematic = dynamics.structure() == Structure::Kinematic;
+        if choices.action == ActionChoice::Sample {
+            let segments = &self.segments;
+            self.noise.write_rows(0, depth.count, |i| row(batch.noise, JOINTS, segments[i].start + depth.j));
+        }
         for (p, at, later) in depth.places() {
-            if choices.action == ActionChoice::Sample {
-                for i in depth.segments(p) {
-                    self.noise.write_row(i, row(batch.noise, JOINTS, self.segments[i].start + depth.j));
-                }
-            }
             let (d_given, d_state) = (&self.model.d_input.panel(at)[seen..], self.d_states.panel(p));
             let d_mean = if depth.j == 0 { self.d_first.panel_mut(p) } else { self.policy.d_output.panel_mut(later) };
             d_mean[choices.taught..].fill(Lanes::default());

@@ -60,8 +60,8 @@ pub struct Choices {
     pub weights: [f32; BASE_DIM],
     /// Actions that the gradient reaches: all nine, or those of the arm.
     pub taught: usize,
-    /// Standardised error beyond which the loss is a line.
-    pub knee: f32,
+    /// Error of each state entry beyond which the loss is a line.
+    pub knees: [f32; BASE_DIM],
     /// Whether L_SC is a sum over a demo instead of a mean.
     objective: Objective,
     /// Which pairs enter B.
@@ -88,11 +88,12 @@ impl Choices {
         let velocity = |i: usize| (JOINTS..2 * JOINTS).contains(&i);
         let finger = |i: usize| i < 2 * JOINTS && i % JOINTS >= ARM_JOINTS;
         let masked = |i: usize| settings.sc_mask_dq && velocity(i) || settings.sc_mask_fingers && finger(i);
-        let weight = |i: usize| if masked(i) { 0.0 } else { 1.0 / (std[i] * std[i]) };
+        let weights: [f32; BASE_DIM] = std::array::from_fn(|i| if masked(i) { 0.0 } else { 1.0 / (std[i] * std[i]) });
+        let knee = if settings.sc_knee > 0.0 { settings.sc_knee as f32 } else { f32::INFINITY };
         Choices {
-            weights: std::array::from_fn(weight),
+            weights,
+            knees: weights.map(|weight| if weight > 0.0 { knee / weight.sqrt() } else { f32::INFINITY }),
             taught: if settings.sc_mask_fingers { ARM_JOINTS } else { JOINTS },
-            knee: if settings.sc_knee > 0.0 { settings.sc_knee as f32 } else { f32::INFINITY },
             objective: settings.loss,
             pairs: settings.sc_pairs,
             rho: settings.rho,

@@ -18,8 +18,9 @@ pub struct Mlp {
     transposed: Vec<f32>,
 }
 
-/// Panels that go through all layers before the next do: two layers of them fit into a core's first cache, beside the weights.
-const STEP_PANELS: usize = 2;
+/// Panels that go through all layers before the next do: as many as the largest tile of a product spans; two layers of 100 of them fit
+/// into a core's first cache.
+const STEP_PANELS: usize = 4;
 
 /// Panels in steps: the last is of three where one panel would be left alone, which a product is slow on.
 fn steps(panels: Range<usize>) -> impl Iterator<Item = Range<usize>> {
@@ -152,21 +153,32 @@ impl Mlp {
 
     /// Gradients of the hidden layers of these panels from `pass.d_output`; they stay in the workspace for the two calls below.
     pub fn backward(&self, pass: &mut Pass, panels: Range<usize>) {
-        steps(panels).for_each(|block| self.backward_block(pass, &block));
+        steps(panels).for_each(|block| self.backward_block(pass, &block, &block));
     }
 
-    fn backward_block(&self, pass: &mut Pass, panels: &Range<usize>) {
+    /// The gradients of the hidden layers come to lie in `places`.
+    fn backward_block(&self, pass: &mut Pass, panels: &Range<usize>, places: &Range<usize>) {
         for layer in (1..self.layers()).rev() {
             let (below, above) = pass.d_hidden.split_at_mut(layer);
-            let dy = if layer + 1 == self.layers() { &pass.d_output } else { &above[0] };
-            let (dx, y) = (below[layer - 1].span_mut(panels), pass.hidden[layer - 1].span(panels));
-            self.input_gradient(layer, dx, dy.span(panels), self.activation.backward(y));
+            let dy = if layer + 1 == self.layers() { pass.d_output.span(panels) } else { above[0].span(places) };
+            let (dx, y) = (below[layer - 1].span_mut(places), pass.hidden[layer - 1].span(panels));
+            self.input_gradient(layer, dx, dy, self.activation.backward(y));
         }
     }
 
     /// `pass.d_input` of these panels, after [`Mlp::backward`].
     pub fn backward_input(&self, pass: &mut Pass, panels: Range<usize>) {
         self.input_gradient(0, pass.d_input.span_mut(&panels), pass.d_hidden[0].span(&panels), Finish::Nothing);
+    }
+
+    /// `pass.d_input` of these panels from `pass.d_output`, for a network that does not learn from it: the gradients of the hidden
+    /// layers are soon overwritten, so that they need not leave the cache.
+    pub fn backward_through(&self, pass: &mut Pass, panels: Range<usize>) {
+        for block in steps(panels) {
+            let places = 0..block.len();
+            self.backward_block(pass, &block, &places);
+            self.input_gradient(0, pass.d_input.span_mut(&block), pass.d_hidden[0].span(&places), Finish::Nothing);
+        }
     }
 
     /// dx = finish(dy w^T).

@@ -3,7 +3,7 @@
 use super::super::lanes::{LANES, Lanes};
 use super::Product;
 use super::tiles::Tile;
-use super::vector::Vector;
+use super::vector::{Isa, Vector};
 use std::arch::x86_64::*;
 
 impl Vector for __m256 {
@@ -85,6 +85,15 @@ impl Vector for __m256 {
         // SAFETY: SSE belongs to x86-64, and a prefetch reads nothing.
         unsafe { _mm_prefetch::<_MM_HINT_T0>(soon.cast()) }
     }
+}
+
+/// AVX2 with FMA: 12 of 16 registers hold sums.
+pub struct Avx2;
+
+impl Isa for Avx2 {
+    type Vector = __m256;
+    const TILE_PANELS: usize = 2;
+    const TILE_ENTRIES: [usize; 5] = [0, 10, 6, 3, 0];
     #[inline(always)]
     unsafe fn tiles<const S: usize>(panels: usize, entries: usize, count: usize, first: Tile) {
         // SAFETY: the caller's.
@@ -96,7 +105,7 @@ impl Vector for __m256 {
 #[inline(never)]
 unsafe fn any_tiles<const S: usize>(panels: usize, entries: usize, count: usize, first: Tile) {
     // SAFETY: the caller's.
-    unsafe { super::tiles::any_tiles::<__m256, S>(panels, entries, count, first) }
+    unsafe { super::tiles::any_tiles::<Avx2, S>(panels, entries, count, first) }
 }
 
 /// # Safety
@@ -104,7 +113,7 @@ unsafe fn any_tiles<const S: usize>(panels: usize, entries: usize, count: usize,
 #[target_feature(enable = "avx2,fma")]
 pub unsafe fn product(result: &mut [Lanes], width: usize, of: &Product) {
     // SAFETY: the caller's.
-    unsafe { super::tiles::product::<__m256>(result, width, of) }
+    unsafe { super::tiles::product::<Avx2>(result, width, of) }
 }
 
 #[target_feature(enable = "avx2,fma")]

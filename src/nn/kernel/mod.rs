@@ -1,10 +1,11 @@
 //! The arithmetic that a network spends its time in: one kernel for all matrix products, which ends with the activation, and what moves
-//! samples into lanes. Each is written once over a `vector` of eight floats and compiled twice, for AVX2 with FMA and for any
-//! processor; which one runs is found out at run time. Results differ in their last bits between the two, never between runs on one
-//! processor. All `unsafe` code of the library stands in this directory.
+//! samples into lanes. Each is written once over a `vector` of eight floats and compiled for AVX-512, for AVX2 with FMA and for any
+//! processor; which one runs is found out at run time. The first two give the same bits, the third others in the last places. All `unsafe` code of the library stands in this directory.
 
 #[cfg(target_arch = "x86_64")]
 mod avx2;
+#[cfg(target_arch = "x86_64")]
+mod avx512;
 mod entries;
 mod tiles;
 mod vector;
@@ -88,8 +89,10 @@ fn product_on(path: Path, result: &mut [Lanes], width: usize, of: Product) {
     unsafe {
         match path {
             #[cfg(target_arch = "x86_64")]
+            Path::Avx512 => avx512::product(result, width, &of),
+            #[cfg(target_arch = "x86_64")]
             Path::Avx2 => avx2::product(result, width, &of),
-            Path::Portable => tiles::product::<Lanes>(result, width, &of),
+            Path::Portable => tiles::product::<vector::Portable>(result, width, &of),
         }
     }
 }
@@ -104,7 +107,7 @@ fn tanh_on(path: Path, y: &mut [Lanes]) {
     unsafe {
         match path {
             #[cfg(target_arch = "x86_64")]
-            Path::Avx2 => avx2::tanh(y),
+            Path::Avx512 | Path::Avx2 => avx2::tanh(y),
             Path::Portable => entries::tanh_all::<Lanes>(y),
         }
     }
@@ -130,7 +133,7 @@ fn transpose_on(path: Path, to: &mut [Lanes], from: &[Lanes], entries: usize) {
     unsafe {
         match path {
             #[cfg(target_arch = "x86_64")]
-            Path::Avx2 => avx2::transpose(to, from, entries),
+            Path::Avx512 | Path::Avx2 => avx2::transpose(to, from, entries),
             Path::Portable => entries::transpose::<Lanes>(to, from, entries),
         }
     }
@@ -150,7 +153,7 @@ fn interleave_on(path: Path, panel: &mut [Lanes], rows: [&[f32]; LANES]) {
     unsafe {
         match path {
             #[cfg(target_arch = "x86_64")]
-            Path::Avx2 => avx2::interleave(panel, rows),
+            Path::Avx512 | Path::Avx2 => avx2::interleave(panel, rows),
             Path::Portable => entries::interleave::<Lanes>(panel, rows),
         }
     }
@@ -160,6 +163,8 @@ fn interleave_on(path: Path, panel: &mut [Lanes], rows: [&[f32]; LANES]) {
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Path {
     #[cfg(target_arch = "x86_64")]
+    Avx512,
+    #[cfg(target_arch = "x86_64")]
     Avx2,
     Portable,
 }
@@ -168,7 +173,9 @@ impl Path {
     fn best() -> Path {
         #[cfg(target_arch = "x86_64")]
         if std::arch::is_x86_feature_detected!("avx2") && std::arch::is_x86_feature_detected!("fma") {
-            return Path::Avx2;
+            let more_registers =
+                std::arch::is_x86_feature_detected!("avx512f") && std::arch::is_x86_feature_detected!("avx512vl");
+            return if more_registers { Path::Avx512 } else { Path::Avx2 };
         }
         Path::Portable
     }

@@ -4,12 +4,16 @@ use super::tiles::{runs, spans};
 use super::*;
 use std::cmp::Ordering;
 
+/// Every path that this processor has.
 fn paths() -> Vec<Path> {
-    let mut paths = vec![Path::Portable];
-    if Path::best() != Path::Portable {
-        paths.push(Path::best());
-    }
-    paths
+    let all = [
+        #[cfg(target_arch = "x86_64")]
+        Path::Avx512,
+        #[cfg(target_arch = "x86_64")]
+        Path::Avx2,
+        Path::Portable,
+    ];
+    all.into_iter().skip_while(|path| *path != Path::best()).collect()
 }
 
 fn value(i: usize) -> f32 {
@@ -24,7 +28,7 @@ fn lanes(n: usize, from: usize) -> Vec<Lanes> {
 #[test]
 fn products_equal_plain_loops() {
     for path in paths() {
-        for panels in 0..=5 {
+        for panels in 0..=6 {
             for (depth, width) in (1..=25).map(|width| (24, width)).chain([(1, 7), (9, 4), (44, 100), (100, 9), (3, 31)]) {
                 let x = lanes(panels * depth, 1);
                 let (matrix, bias) = ((0..depth * width).map(value).collect::<Vec<_>>(), lanes(width, 5));
@@ -54,6 +58,32 @@ fn products_equal_plain_loops() {
                         check(Coefficients::Samples(&samples), start, &at);
                     }
                 }
+            }
+        }
+    }
+}
+
+/// Who trains on a newer processor gets the same file.
+#[test]
+#[cfg(target_arch = "x86_64")]
+fn avx512_gives_the_bits_of_avx2() {
+    let has = |path: Path| paths().contains(&path);
+    for (panels, depth, width) in (1..=9).flat_map(|panels| [(panels, 100, 100), (panels, 48, 9), (panels, 104, 31)]) {
+        let (x, y, samples) = (lanes(panels * depth, 1), lanes(panels * width, 20), lanes(depth * width / LANES, 9));
+        let matrix: Vec<f32> = (0..depth * width).map(value).collect();
+        let run = |path: Path, a: Coefficients, finish: Finish| {
+            let mut result = lanes(panels * width, 2);
+            product_on(path, &mut result, width, Product { x: &x, depth, a, start: Start::Result, finish });
+            result
+        };
+        if has(Path::Avx512) {
+            for finish in [Finish::Nothing, Finish::Tanh, Finish::TanhSlope(&y)] {
+                let a = Coefficients::Matrix(&matrix);
+                assert_eq!(run(Path::Avx512, a, finish), run(Path::Avx2, a, finish));
+            }
+            if depth % LANES == 0 {
+                let a = Coefficients::Samples(&samples);
+                assert_eq!(run(Path::Avx512, a, Finish::Nothing), run(Path::Avx2, a, Finish::Nothing));
             }
         }
     }
@@ -153,9 +183,9 @@ fn runs_cover_a_range_evenly() {
         assert_eq!((parts.iter().sum::<usize>(), parts.len()), (n, n.div_ceil(most)));
         assert!(parts.iter().all(|size| *size <= most && size + 1 >= n.div_ceil(n.div_ceil(most).max(1))));
     }
-    for panels in 0..9 {
-        let parts: Vec<usize> = spans(panels).flat_map(|(size, times)| std::iter::repeat_n(size, times)).collect();
+    for (panels, most) in (0..12).flat_map(|panels| [(panels, 2), (panels, 4)]) {
+        let parts: Vec<usize> = spans(panels, most).flat_map(|(size, times)| std::iter::repeat_n(size, times)).collect();
         assert_eq!(parts.iter().sum::<usize>(), panels);
-        assert!(parts.iter().all(|size| *size == 2 || *size == 3 || panels == 1));
+        assert!(parts.iter().all(|size| (2..=most.max(3)).contains(size) || panels == 1), "{panels} panels in {parts:?}");
     }
 }

@@ -2,12 +2,8 @@
 
 use super::super::lanes::{LANES, Lanes};
 use super::entries::{tanh, tanh_slope};
-use super::vector::Vector;
+use super::vector::{Isa, Vector};
 use super::{Coefficients, Finish, Product, Start};
-
-/// The most entries that a register tile of 1, 2 or 3 panels spans: at most 12 sums of 8 lanes, which leave four of 16 registers for
-/// operands, and at least 8, which hide the latency of FMA. A single panel is bound by loads, whatever it spans.
-const TILE_ENTRIES: [usize; 4] = [0, 10, 6, 3];
 
 /// The addresses of one register tile.
 #[derive(Clone, Copy)]
@@ -47,12 +43,12 @@ enum TileFinish {
 /// # Safety
 /// The lengths fit as [`super::product`] says, and the processor has T's instructions.
 #[inline(always)]
-pub unsafe fn product<T: Vector>(result: &mut [Lanes], width: usize, of: &Product) {
+pub unsafe fn product<T: Isa>(result: &mut [Lanes], width: usize, of: &Product) {
     let mut p = 0;
-    for (panels, times) in spans(of.x.len() / of.depth) {
+    for (panels, times) in spans(of.x.len() / of.depth, T::TILE_PANELS) {
         for _ in 0..times {
             let mut f = 0;
-            for (entries, count) in runs(width, TILE_ENTRIES[panels]) {
+            for (entries, count) in runs(width, T::TILE_ENTRIES[panels]) {
                 // SAFETY: the tiles read entries 0..depth of panels p.. of x, biases f.. and activations at the result's place, and write
                 // entries f.. of panels p.. of the result, all within their arrays; they read a(k, f) for k < depth and f < width, in
                 // a matrix that is number k * width + f < depth * width, among samples number (k / 8 * width + f) * 8 + k % 8 < depth
@@ -70,15 +66,15 @@ pub unsafe fn product<T: Vector>(result: &mut [Lanes], width: usize, of: &Produc
     }
 }
 
-/// Panels of a tile, and how many times: two at a time, and three where one would be left alone.
+/// Panels of a tile, and how many times: `most` (2 or 4) at a time; a panel that would be left alone goes with those before it, as
+/// three, or as three and two.
 #[inline(always)]
-pub fn spans(panels: usize) -> impl Iterator<Item = (usize, usize)> {
-    let (pairs, rest) = match (panels / 2, panels % 2) {
-        (0, rest) => (0, rest),
-        (pairs, 1) => (pairs - 1, 3),
-        (pairs, _) => (pairs, 0),
+pub fn spans(panels: usize, most: usize) -> impl Iterator<Item = (usize, usize)> {
+    let (whole, last) = match (panels / most, panels % most) {
+        (whole, 1) if whole > 0 => (whole - 1, [3, most - 2]),
+        (whole, rest) => (whole, [rest, 0]),
     };
-    [(2, pairs), (rest, usize::from(rest > 0))].into_iter().filter(|(_, times)| *times > 0)
+    [(most, whole), (last[0], 1), (last[1], 1)].into_iter().filter(|(panels, times)| *panels > 0 && *times > 0)
 }
 
 /// n as the fewest parts of at most `most`, as even as can be: sizes, and how many parts have them.
@@ -145,17 +141,17 @@ impl Tile {
 /// # Safety
 /// Every address lies within its array, and the processor has T's instructions.
 #[inline(always)]
-unsafe fn tiles<T: Vector, const S: usize, const P: usize, const F: usize>(count: usize, first: Tile) {
+unsafe fn tiles<T: Isa, const S: usize, const P: usize, const F: usize>(count: usize, first: Tile) {
     let mut tile = first;
     for _ in 0..count {
         // SAFETY: the caller's.
         unsafe {
             if let TileFinish::TanhSlope(y) | TileFinish::ReluSlope(y) = tile.finish {
                 let lines = (0..P).flat_map(|p| (0..F).step_by(2).map(move |f| p * tile.width + f));
-                lines.for_each(|at| T::prefetch(y.wrapping_add(at)));
+                lines.for_each(|at| T::Vector::prefetch(y.wrapping_add(at)));
             }
-            let sums = sums::<T, S, P, F>(&tile);
-            finish::<T, P, F>(&tile, sums);
+            let sums = sums::<T::Vector, S, P, F>(&tile);
+            finish::<T::Vector, P, F>(&tile, sums);
         }
         tile = tile.next(F, S);
     }
@@ -230,7 +226,7 @@ unsafe fn finish<T: Vector, const P: usize, const F: usize>(tile: &Tile, sums: [
 /// # Safety
 /// As [`tiles`].
 #[inline(always)]
-pub unsafe fn any_tiles<T: Vector, const S: usize>(panels: usize, entries: usize, count: usize, first: Tile) {
+pub unsafe fn any_tiles<T: Isa, const S: usize>(panels: usize, entries: usize, count: usize, first: Tile) {
     // SAFETY: the caller's.
     unsafe {
         match (panels, entries) {
@@ -253,7 +249,38 @@ pub unsafe fn any_tiles<T: Vector, const S: usize>(panels: usize, entries: usize
             (3, 1) => tiles::<T, S, 3, 1>(count, first),
             (3, 2) => tiles::<T, S, 3, 2>(count, first),
             (3, 3) => tiles::<T, S, 3, 3>(count, first),
-            _ => unreachable!("tiles span 1 to 3 panels, and no more entries than registers hold"),
+            _ => unreachable!("no tile spans {panels} panels and {entries} entries"),
+        }
+    }
+}
+
+/// The same, with the larger tiles of 32 registers.
+///
+/// # Safety
+/// As [`tiles`].
+#[inline(always)]
+pub unsafe fn any_large_tiles<T: Isa, const S: usize>(panels: usize, entries: usize, count: usize, first: Tile) {
+    // SAFETY: the caller's.
+    unsafe {
+        match (panels, entries) {
+            (2, 7) => tiles::<T, S, 2, 7>(count, first),
+            (2, 8) => tiles::<T, S, 2, 8>(count, first),
+            (2, 9) => tiles::<T, S, 2, 9>(count, first),
+            (2, 10) => tiles::<T, S, 2, 10>(count, first),
+            (2, 11) => tiles::<T, S, 2, 11>(count, first),
+            (2, 12) => tiles::<T, S, 2, 12>(count, first),
+            (3, 4) => tiles::<T, S, 3, 4>(count, first),
+            (3, 5) => tiles::<T, S, 3, 5>(count, first),
+            (3, 6) => tiles::<T, S, 3, 6>(count, first),
+            (3, 7) => tiles::<T, S, 3, 7>(count, first),
+            (3, 8) => tiles::<T, S, 3, 8>(count, first),
+            (4, 1) => tiles::<T, S, 4, 1>(count, first),
+            (4, 2) => tiles::<T, S, 4, 2>(count, first),
+            (4, 3) => tiles::<T, S, 4, 3>(count, first),
+            (4, 4) => tiles::<T, S, 4, 4>(count, first),
+            (4, 5) => tiles::<T, S, 4, 5>(count, first),
+            (4, 6) => tiles::<T, S, 4, 6>(count, first),
+            _ => any_tiles::<T, S>(panels, entries, count, first),
         }
     }
 }

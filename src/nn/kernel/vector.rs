@@ -31,9 +31,37 @@ pub trait Vector: Copy {
     unsafe fn transposed(square: [Self; LANES]) -> [Self; LANES];
     /// Asks the processor to bring this into its cache while it works on something else; without effect on any result.
     unsafe fn prefetch(soon: *const Lanes);
+}
+
+/// An instruction set: its vector, and the tiles that its registers hold.
+pub trait Isa {
+    /// Eight floats in a register.
+    type Vector: Vector;
+    /// Panels of a tile, where there are enough.
+    const TILE_PANELS: usize;
+    /// The most entries that a register tile of 1, 2, 3 or 4 panels spans: as many sums as leave registers for the operands, and at
+    /// least 8, which hide the latency of FMA. A single panel is bound by loads, whatever it spans.
+    const TILE_ENTRIES: [usize; 5];
     /// [`super::tiles::any_tiles`], compiled by itself: merged into its caller the compiler would know `inner` and unroll that loop, to
     /// its harm.
+    ///
+    /// # Safety
+    /// As there.
     unsafe fn tiles<const S: usize>(panels: usize, entries: usize, count: usize, first: Tile);
+}
+
+/// What every processor has: as many sums as with AVX2.
+pub struct Portable;
+
+impl Isa for Portable {
+    type Vector = Lanes;
+    const TILE_PANELS: usize = 2;
+    const TILE_ENTRIES: [usize; 5] = [0, 10, 6, 3, 0];
+    #[inline(never)]
+    unsafe fn tiles<const S: usize>(panels: usize, entries: usize, count: usize, first: Tile) {
+        // SAFETY: the caller's.
+        unsafe { super::tiles::any_tiles::<Self, S>(panels, entries, count, first) }
+    }
 }
 
 impl Vector for Lanes {
@@ -90,9 +118,4 @@ impl Vector for Lanes {
     }
     #[inline(always)]
     unsafe fn prefetch(_: *const Lanes) {}
-    #[inline(never)]
-    unsafe fn tiles<const S: usize>(panels: usize, entries: usize, count: usize, first: Tile) {
-        // SAFETY: the caller's.
-        unsafe { super::tiles::any_tiles::<Self, S>(panels, entries, count, first) }
-    }
 }

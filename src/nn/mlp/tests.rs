@@ -33,6 +33,11 @@ fn gradients_of_every_layer_equal_finite_differences() {
         mlp.add_gradient(&mut pass, 0..1);
         mlp.add_gradient(&mut pass, 1..panels);
         mlp.finish_gradient(&pass, &mut gradient);
+        let d_input = std::mem::take(&mut pass.d_input);
+        pass.reserve(&mlp, panels);
+        mlp.backward_through(&mut pass, 0..1);
+        mlp.backward_through(&mut pass, 1..panels);
+        assert_eq!(pass.d_input, d_input);
         let h = 2e-3f32;
         let check = |analytic: f32, plus: f64, minus: f64, what: &str| {
             let numeric = (plus - minus) / f64::from(2.0 * h);
