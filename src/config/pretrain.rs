@@ -7,6 +7,10 @@ use crate::error::Result;
 use crate::nn::Activation;
 use serde::{Deserialize, Serialize};
 
+/// More steps than any control task looks ahead.
+const MOST_STEPS: usize = 100;
+/// More networks than any ensemble needs.
+const MOST_NETWORKS: usize = 100;
 /// More executions of each demo than any dynamics network needs.
 const MOST_EXECUTIONS: u64 = 1000;
 
@@ -26,6 +30,10 @@ pub struct PretrainSettings {
     pub structure: Structure,
     /// The loss of Eq. 6.
     pub loss: ModelLoss,
+    /// Steps that the network runs on its own predictions in the loss; 1 = Eq. 6, on observed states only.
+    pub steps: usize,
+    /// Networks that learn the same from other beginnings; the rollouts of state cloning pass through one after another, an update each.
+    pub ensemble: usize,
     /// K: how often each demo's commands are executed again in the simulator, under new noise and the pulses below (Algorithm 4 executes
     /// them). The dynamics network learns from them; the policy never sees them.
     pub reexecute: u64,
@@ -54,6 +62,8 @@ impl Default for PretrainSettings {
             features: FeatureSet::Fk,
             structure: Structure::Kinematic,
             loss: ModelLoss::StandardisedHuber,
+            steps: 1,
+            ensemble: 1,
             reexecute: 0,
             reexecute_pulses: PulseSettings { probability: 0.01, ..PulseSettings::default() },
             epochs: 200,
@@ -74,6 +84,12 @@ impl PretrainSettings {
     pub fn validate(&self) -> Result<()> {
         network("pretrain", self.hidden_layers, self.hidden_units)?;
         at_least_one("pretrain.epochs", self.epochs)?;
+        if !(1..=MOST_STEPS).contains(&self.steps) {
+            return refuse("pretrain.steps", self.steps, &format!("from 1 to {MOST_STEPS}"));
+        }
+        if !(1..=MOST_NETWORKS).contains(&self.ensemble) {
+            return refuse("pretrain.ensemble", self.ensemble, &format!("from 1 to {MOST_NETWORKS}"));
+        }
         if self.reexecute > MOST_EXECUTIONS {
             return refuse("pretrain.reexecute", self.reexecute, &format!("from 0 to {MOST_EXECUTIONS}"));
         }

@@ -43,7 +43,8 @@ struct Counts {
     skipped: u64,
     net: Steps,
     std: Steps,
-    model_adam: Option<u32>,
+    /// One an ensemble member.
+    model_adam: Option<Vec<u32>>,
     averages: Averages,
 }
 
@@ -123,8 +124,11 @@ impl Learner {
         push_descent(&mut tensors, NET, &self.net_descent);
         push_descent(&mut tensors, STD, &self.std_descent);
         if let Some(model) = &self.model {
-            tensors.push(vector(MODEL, model.dynamics.net.params()));
-            push_adam(&mut tensors, MODEL, &model.adam);
+            let nets = [&model.dynamics.net].into_iter().chain(&model.dynamics.others);
+            for (i, (net, adam)) in nets.zip(&model.adams).enumerate() {
+                tensors.push(vector(&member(i), net.params()));
+                push_adam(&mut tensors, &member(i), adam);
+            }
         }
         let counts = Counts {
             updates: self.updates,
@@ -132,7 +136,7 @@ impl Learner {
             skipped: self.skipped,
             net: self.net_descent.steps(),
             std: self.std_descent.steps(),
-            model_adam: self.model.as_ref().map(|model| model.adam.state().2),
+            model_adam: self.model.as_ref().map(|model| model.adams.iter().map(|adam| adam.state().2).collect()),
             averages,
         };
         State { tensors, counts }
@@ -145,15 +149,26 @@ impl Learner {
         self.net_descent = descent(reader, NET, net, self.settings.ema_decay, counts.net)?;
         self.std_descent = descent(reader, STD, std, self.settings.ema_decay, counts.std)?;
         if let Some(model) = &mut self.model {
-            let steps = counts.model_adam.ok_or("it was made without a dynamics network")?;
+            let steps = counts.model_adam.as_ref().ok_or("it was made without a dynamics network")?;
+            if steps.len() != model.adams.len() {
+                return Err(format!("it has {} dynamics networks, this run {}", steps.len(), model.adams.len()));
+            }
             let len = model.dynamics.net.params().len();
-            model.dynamics.net.params_mut().copy_from_slice(&reader.tensor(MODEL, &[len])?);
-            model.adam = adam(reader, MODEL, len, steps)?;
+            let nets = [&mut model.dynamics.net].into_iter().chain(&mut model.dynamics.others);
+            for (i, (net, (state, steps))) in nets.zip(model.adams.iter_mut().zip(steps)).enumerate() {
+                net.params_mut().copy_from_slice(&reader.tensor(&member(i), &[len])?);
+                *state = adam(reader, &member(i), len, *steps)?;
+            }
         }
         (self.updates, self.draws, self.skipped) = (counts.updates, counts.draws, counts.skipped);
         self.update_averaged();
         Ok(())
     }
+}
+
+/// Name of the tensors of the dynamics networks, that in use first.
+fn member(i: usize) -> String {
+    if i == 0 { MODEL.into() } else { format!("{MODEL}.{}", i + 1) }
 }
 
 impl Descent {

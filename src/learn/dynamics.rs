@@ -28,7 +28,10 @@ pub struct Dynamics {
     features: Features,
     action: Scaling,
     residual: Scaling,
+    /// The network in use.
     pub(super) net: Mlp,
+    /// The others of an ensemble (`pretrain.ensemble`), which take their turns.
+    pub(super) others: Vec<Mlp>,
     settings: PretrainSettings,
 }
 
@@ -45,10 +48,25 @@ impl Dynamics {
             action: Scaling::fit(&corpus.executed, JOINTS, ACTION_FLOOR_RAD_S),
             residual: Scaling { mean: vec![0.0; BASE_DIM], std: vec![1.0; BASE_DIM] },
             net: Mlp::new(&widths, settings.activation, rng),
+            others: Vec::new(),
             settings: settings.clone(),
         };
         dynamics.residual = Scaling::fit(&corpus.model_samples(&dynamics).targets, BASE_DIM, STEP_FLOOR);
         dynamics
+    }
+
+    /// A further network with random weights, put into use.
+    pub(super) fn add_member(&mut self, rng: &mut impl Rng) {
+        let fresh = Mlp::new(self.net.widths(), self.net.activation(), rng);
+        self.others.push(std::mem::replace(&mut self.net, fresh));
+    }
+
+    /// The next network of the ensemble is in use, the present one comes last.
+    pub(super) fn turn(&mut self) {
+        if let Some(next) = self.others.first_mut() {
+            std::mem::swap(&mut self.net, next);
+            self.others.rotate_left(1);
+        }
     }
 
     /// The task it was trained on.
@@ -104,6 +122,14 @@ impl Dynamics {
         }
     }
 
+    /// Gradient with respect to states, but for the network's part, from that with respect to the next states: in place, as every entry
+    /// is known to stay, except that a kinematic structure does not look at dq.
+    pub(super) fn known_backward(&self, d_state: &mut [Lanes]) {
+        if self.structure == Structure::Kinematic {
+            d_state[JOINTS..2 * JOINTS].fill(Lanes::default());
+        }
+    }
+
     /// The next states' changing entries from the network's output.
     pub(super) fn write_next(&self, state: &[Lanes], action: &[Lanes], output: &[Lanes], next: &mut [Lanes]) {
         for (i, slot) in next.iter_mut().enumerate() {
@@ -131,12 +157,16 @@ impl Dynamics {
         state.iter().map(|entry| entry.0[0]).collect()
     }
 
-    /// A panel of states becomes the next ones; `pass` has room for one panel.
+    /// A panel of states becomes the next ones, by the mean of an ensemble; `pass` has room for one panel.
     pub(super) fn step(&self, state: &mut [Lanes], action: &[Lanes], pass: &mut Pass) {
         self.write_inputs(state, action, pass.input.panel_mut(0));
-        self.net.forward(pass, 0..1);
-        let mut next = [Lanes::default(); BASE_DIM];
-        self.write_next(state, action, pass.output.panel(0), &mut next);
+        let (mut output, mut next) = ([Lanes::default(); BASE_DIM], [Lanes::default(); BASE_DIM]);
+        for net in [&self.net].into_iter().chain(&self.others) {
+            net.forward(pass, 0..1);
+            output.iter_mut().zip(pass.output.panel(0)).for_each(|(sum, value)| *sum += *value);
+        }
+        let members = (1 + self.others.len()) as f32;
+        self.write_next(state, action, &output.map(|sum| sum / members), &mut next);
         state[..BASE_DIM].copy_from_slice(&next);
     }
 
@@ -147,6 +177,7 @@ impl Dynamics {
         push_scaling(&mut out, "dynamics.action", &self.action);
         push_scaling(&mut out, "dynamics.residual", &self.residual);
         push_network(&mut out, "dynamics", &self.net);
+        self.others.iter().enumerate().for_each(|(i, net)| push_network(&mut out, &member(i), net));
         out
     }
 
@@ -175,7 +206,10 @@ impl Dynamics {
         let reader = Reader { tensors, meta };
         let task = reader.task("dynamics")?;
         let features = reader.features("dynamics", task)?;
-        let net = reader.network("dynamics", features.width() + JOINTS, BASE_DIM)?;
+        let settings: PretrainSettings = reader.meta("settings")?;
+        let network = |name: &str| reader.network(name, features.width() + JOINTS, BASE_DIM);
+        let (net, others) = (network("dynamics")?, (1..settings.ensemble).map(|i| network(&member(i - 1))));
+        let others = others.collect::<Result<_, _>>()?;
         Ok(Dynamics {
             task,
             structure: reader.meta("structure")?,
@@ -183,9 +217,15 @@ impl Dynamics {
             action: reader.scaling("dynamics.action", JOINTS)?,
             residual: reader.scaling("dynamics.residual", BASE_DIM)?,
             net,
-            settings: reader.meta("settings")?,
+            others,
+            settings,
         })
     }
+}
+
+/// Name of the tensors of ensemble member `i` of [`Dynamics::others`].
+fn member(i: usize) -> String {
+    format!("dynamics.member_{}", i + 2)
 }
 
 #[cfg(test)]
@@ -198,13 +238,29 @@ mod tests {
     fn dynamics_survive_their_tensors_and_copy_the_context() {
         let corpus = Corpus::new(&demos(Task::Stack, 3, 20, 0), "training").expect("demos");
         for structure in [Structure::Plain, Structure::Kinematic] {
-            let settings = PretrainSettings { structure, ..Default::default() };
-            let dynamics = Dynamics::new(&corpus, &settings, &mut stream(0, "test", 0));
+            let settings = PretrainSettings { structure, ensemble: 3, ..Default::default() };
+            let mut dynamics = Dynamics::new(&corpus, &settings, &mut stream(0, "test", 0));
+            (1..3).for_each(|i| dynamics.add_member(&mut stream(0, "test", i)));
             let back = Dynamics::from_tensors(&dynamics.to_tensors(), &dynamics.meta());
             assert_eq!(back.as_ref(), Ok(&dynamics));
             let next = dynamics.predict(corpus.state(4), &[0.1; JOINTS]);
             assert_eq!(next[BASE_DIM..], corpus.state(4)[BASE_DIM..]);
         }
+    }
+
+    #[test]
+    fn members_take_turns_and_predict_their_mean() {
+        let corpus = Corpus::new(&demos(Task::Stack, 3, 20, 0), "training").expect("demos");
+        let mut dynamics = Dynamics::new(&corpus, &PretrainSettings::default(), &mut stream(0, "test", 0));
+        let next = |dynamics: &Dynamics| f64::from(dynamics.predict(corpus.state(4), &[0.1; JOINTS])[BASE_DIM - 8]);
+        let (first, alone) = (dynamics.net.clone(), next(&dynamics));
+        dynamics.add_member(&mut stream(0, "test", 1));
+        let second = Dynamics { others: Vec::new(), ..dynamics.clone() };
+        assert!((next(&dynamics) - (alone + next(&second)) / 2.0).abs() < 1e-6);
+        dynamics.turn();
+        assert!(dynamics.net == first && dynamics.others == [second.net.clone()]);
+        dynamics.turn();
+        assert!(dynamics.net == second.net && dynamics.others == [first]);
     }
 
     #[test]

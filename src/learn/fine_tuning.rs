@@ -14,7 +14,8 @@ pub struct Model {
     pub samples: Samples,
     held_out: Samples,
     weights: Vec<f32>,
-    pub(super) adam: Adam,
+    /// One a network of the ensemble, that of the network in use first.
+    pub(super) adams: Vec<Adam>,
     work: Regression,
 }
 
@@ -25,19 +26,25 @@ impl Model {
             samples: corpus.model_samples(&dynamics),
             held_out: held_out.model_samples(&dynamics),
             weights: loss_weights(&dynamics),
-            adam: Adam::new(dynamics.net.params().len()),
+            adams: (0..=dynamics.others.len()).map(|_| Adam::new(dynamics.net.params().len())).collect(),
             work: Regression::default(),
             dynamics,
         }
     }
 
+    /// The next network of the ensemble is in use.
+    pub fn turn(&mut self) {
+        self.dynamics.turn();
+        self.adams.rotate_left(1);
+    }
+
     /// One update on transitions `rows` of the training demos; returns the loss before it and the norm of its gradient.
     pub fn fine_tune(&mut self, rows: &[usize], mean_length: f32, learning_rate: f64) -> (f64, f64) {
-        let Model { dynamics, samples, weights, adam, work, .. } = self;
+        let Model { dynamics, samples, weights, adams, work, .. } = self;
         let loss = model_loss(dynamics, weights, rows.len(), mean_length);
         let l_model = work.loss(&dynamics.net, samples, rows, &loss, true);
         let norm = clip_by_global_norm(&mut work.gradient, dynamics.settings().clip_norm);
-        adam.step(&mut dynamics.net.params_mut(), &work.gradient, learning_rate);
+        adams[0].step(&mut dynamics.net.params_mut(), &work.gradient, learning_rate);
         (l_model, norm)
     }
 

@@ -162,9 +162,10 @@ impl Learner {
     /// # Errors
     /// [`Error::Usage`] without a dynamics network, [`Error::Failed`] when L_SC is not a number.
     pub fn state_cloning(&mut self, demos: &[usize], rows: &[usize]) -> Result<f64> {
-        let Some(model) = &self.model else {
+        let Some(model) = &mut self.model else {
             return Err(Error::Usage("state cloning needs a dynamics network: run `hilt pretrain` first".into()));
         };
+        model.turn();
         let mut rng = stream(self.seed, "train.sc", self.draws);
         let choices = &self.sc_choices;
         let lengths = demos.iter().map(|d| self.corpus.demo(*d).len());

@@ -15,6 +15,7 @@ pub mod hil;
 mod learner;
 mod metrics;
 mod model_report;
+mod multi_step;
 mod policy;
 pub mod pretrain_dynamics;
 mod pushes;

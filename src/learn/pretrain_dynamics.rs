@@ -4,6 +4,7 @@ use super::corpus::{Corpus, Samples};
 use super::dynamics::Dynamics;
 use super::metrics::{EpochMetrics, Mean, table};
 use super::model_report::{ModelReport, error_table};
+use super::multi_step::{MultiStep, horizons};
 use super::regression::{Loss, Regression};
 use crate::config::{ModelLoss, PretrainSettings};
 use crate::demo::Demo;
@@ -30,41 +31,83 @@ pub fn pretrain_dynamics(
     settings.validate()?;
     let (corpus, held_out) = (Corpus::new(train, "training")?, Corpus::new(validation, "validation")?);
     let mut dynamics = Dynamics::new(&corpus, settings, &mut stream(seed, "pretrain.init", 0));
-    let (samples, held_out_samples) = (corpus.model_samples(&dynamics), held_out.model_samples(&dynamics));
+    let held_out_samples = held_out.model_samples(&dynamics);
+    let mut lesson = Lesson::new(&corpus, &dynamics);
     let batches = Batches::new(&corpus, settings.batch_rows);
     let total = settings.epochs * batches.per_epoch();
-    let mut adam = Adam::new(dynamics.net.params().len());
-    let mut ema = Ema::new(dynamics.net.params(), settings.ema_decay);
-    let (mut work, mut averaged, mut epochs, mut updates) = (Regression::default(), dynamics.clone(), Vec::new(), 0);
-    let weights = loss_weights(&dynamics);
-    for epoch in 0..settings.epochs {
-        let mut mean = Mean::default();
-        let mut metrics = EpochMetrics::new("pretrain", epoch + 1, settings.epochs);
-        for rows in batches.shuffled(&mut stream(seed, "pretrain.order", epoch)).iter() {
-            interrupt.check()?;
-            let loss = model_loss(&dynamics, &weights, rows.len(), corpus.rows() as f32 / corpus.demos() as f32);
-            let l_model = work.loss(&dynamics.net, &samples, rows, &loss, true);
-            if !l_model.is_finite() {
-                let update = updates + 1;
-                return Err(Error::Failed(format!(
-                    "the loss of the dynamics network (Eq. 6) is {l_model} at update {update}; lower pretrain.learning_rate"
-                )));
-            }
-            clip_by_global_norm(&mut work.gradient, settings.clip_norm);
-            metrics.learning_rate = cosine(settings.learning_rate, settings.final_learning_rate, updates, total);
-            adam.step(&mut dynamics.net.params_mut(), &work.gradient, metrics.learning_rate);
-            ema.update(dynamics.net.params());
-            mean.add(l_model);
-            updates += 1;
+    let (mut work, mut epochs) = (Regression::default(), Vec::new());
+    for member in 0..settings.ensemble as u64 {
+        if member > 0 {
+            dynamics.add_member(&mut stream(seed, "pretrain.init", member));
         }
-        averaged.net.params_mut().copy_from_slice(ema.average());
-        (metrics.updates, metrics.l_model) = (updates, mean.get());
-        metrics.validation_l_model = validation_loss(&averaged, &held_out, &held_out_samples, &mut work);
-        log(&metrics);
-        epochs.push(metrics);
+        let mut adam = Adam::new(dynamics.net.params().len());
+        let mut ema = Ema::new(dynamics.net.params(), settings.ema_decay);
+        let (mut averaged, mut updates) = (dynamics.clone(), 0);
+        for epoch in member * settings.epochs..(member + 1) * settings.epochs {
+            let mut mean = Mean::default();
+            let mut metrics = EpochMetrics::new("pretrain", epoch + 1, settings.epochs * settings.ensemble as u64);
+            for rows in batches.shuffled(&mut stream(seed, "pretrain.order", epoch)).iter() {
+                interrupt.check()?;
+                let (l_model, gradient) = lesson.gradient(&dynamics, rows);
+                if !l_model.is_finite() {
+                    let update = updates + 1;
+                    return Err(Error::Failed(format!(
+                        "the loss of the dynamics network (Eq. 6) is {l_model} at update {update}; lower pretrain.learning_rate"
+                    )));
+                }
+                clip_by_global_norm(gradient, settings.clip_norm);
+                metrics.learning_rate = cosine(settings.learning_rate, settings.final_learning_rate, updates, total);
+                adam.step(&mut dynamics.net.params_mut(), gradient, metrics.learning_rate);
+                ema.update(dynamics.net.params());
+                mean.add(l_model);
+                updates += 1;
+            }
+            averaged.net.params_mut().copy_from_slice(ema.average());
+            (metrics.updates, metrics.l_model) = (updates, mean.get());
+            metrics.validation_l_model = validation_loss(&averaged, &held_out, &held_out_samples, &mut work);
+            log(&metrics);
+            epochs.push(metrics);
+        }
+        dynamics = averaged;
     }
-    let errors = error_table(&averaged, &held_out);
-    Ok((averaged, ModelReport { errors, metrics: table(&epochs) }))
+    dynamics.turn(); // the first network is in use
+    let errors = error_table(&dynamics, &held_out);
+    Ok((dynamics, ModelReport { errors, metrics: table(&epochs) }))
+}
+
+/// What there is to learn from, and how: Eq. 6, or the same over several steps.
+struct Lesson<'a> {
+    corpus: &'a Corpus,
+    samples: Samples,
+    weights: Vec<f32>,
+    mean_length: f32,
+    one_step: Regression,
+    many_steps: MultiStep,
+}
+
+impl<'a> Lesson<'a> {
+    fn new(corpus: &'a Corpus, dynamics: &Dynamics) -> Self {
+        Lesson {
+            corpus,
+            samples: corpus.model_samples(dynamics),
+            weights: loss_weights(dynamics),
+            mean_length: corpus.rows() as f32 / corpus.demos() as f32,
+            one_step: Regression::default(),
+            many_steps: MultiStep::default(),
+        }
+    }
+
+    /// Loss on the transitions `rows`, and its gradient.
+    fn gradient(&mut self, dynamics: &Dynamics, rows: &[usize]) -> (f64, &mut [f32]) {
+        let steps = dynamics.settings().steps;
+        if steps == 1 {
+            let loss = model_loss(dynamics, &self.weights, rows.len(), self.mean_length);
+            return (self.one_step.loss(&dynamics.net, &self.samples, rows, &loss, true), &mut self.one_step.gradient);
+        }
+        let pairs = horizons(self.corpus, rows, steps).map(|(_, steps)| steps).sum();
+        let loss = model_loss(dynamics, &self.weights, pairs, self.mean_length);
+        (self.many_steps.loss(dynamics, self.corpus, rows, steps, &loss), &mut self.many_steps.gradient)
+    }
 }
 
 /// Loss on all of the validation transitions.

@@ -98,12 +98,17 @@ impl Shard {
         let mut sum = Lanes::default();
         for ((d, output), weight) in d_output.iter_mut().zip(output).zip(loss.weights) {
             let error = *output - *d;
-            let bent = bend(error, if loss.huber { HUBER_KNEE } else { f32::INFINITY });
+            let bent = bend(error, knee(loss.huber));
             sum += bent * (error * 2.0 - bent) * *weight;
             *d = bent * (2.0 * loss.scale * weight);
         }
         self.loss += sum.0.iter().map(|sum| f64::from(loss.scale * sum)).sum::<f64>();
     }
+}
+
+/// Where the loss turns into a line: never, if it is the square.
+pub(super) fn knee(huber: bool) -> f32 {
+    if huber { HUBER_KNEE } else { f32::INFINITY }
 }
 
 /// Huber's function is a parabola up to `knee`, and its tangent from there: half its derivative, from which the function itself is

@@ -11,7 +11,7 @@ use serde_json::Value;
 use std::time::Duration;
 
 fn dynamics() -> Dynamics {
-    let settings = PretrainSettings { hidden_units: 16, epochs: 1, batch_rows: 64, ..Default::default() };
+    let settings = PretrainSettings { hidden_units: 16, epochs: 1, batch_rows: 64, ensemble: 2, ..Default::default() };
     let (train, held_out) = (demos(Task::Stack, 8, 30, 0), demos(Task::Stack, 2, 30, 100));
     pretrain_dynamics(&train, &held_out, &settings, 0, &mut |_| {}, &Interrupt::default()).expect("pretrains").0
 }

@@ -225,9 +225,7 @@ impl Rollout {
         policy.net.backward_input(&mut self.policy, all);
         for (p, at, later) in depth.places() {
             let d_state = self.d_states.panel_mut(p);
-            if dynamics.structure() == Structure::Kinematic {
-                d_state[JOINTS..2 * JOINTS].fill(Lanes::default()); // dq' = a + network does not see dq
-            }
+            dynamics.known_backward(d_state);
             let (state, hand) = (self.states.panel(at), &self.hands[at]);
             let (input, d_input) = (self.policy.input.panel(later), self.policy.d_input.panel(later));
             policy.features().backward(state, hand, input, d_input, d_state);

@@ -39,6 +39,25 @@ fn bytes(policy: &Policy) -> Vec<u32> {
 }
 
 #[test]
+fn several_steps_and_several_networks_learn_as_one_does() {
+    let (train, held_out) = (demos(Task::Stack, 8, 30, 0), demos(Task::Stack, 2, 30, 100));
+    let error = |steps, ensemble, epochs| {
+        let settings = PretrainSettings { hidden_units: 24, batch_rows: 64, epochs, steps, ensemble, ..Default::default() };
+        let (dynamics, report) =
+            pretrain_dynamics(&train, &held_out, &settings, 0, &mut |_| {}, &Interrupt::default()).expect("pretrains");
+        assert_eq!(dynamics.others.len() + 1, ensemble);
+        let Some(Values::F64(ten_steps)) = report.errors.column("network_10_steps").map(|c| &c.values) else {
+            panic!("the report has errors after ten steps");
+        };
+        ten_steps[4] // of the block's position
+    };
+    for (steps, ensemble) in [(1, 1), (5, 1), (1, 3), (5, 2)] {
+        let (before, after) = (error(steps, ensemble, 1), error(steps, ensemble, 40));
+        assert!(after < 0.5 * before, "{steps} steps, {ensemble} networks: {before} m became {after} m");
+    }
+}
+
+#[test]
 fn pure_cloning_is_the_loop_with_alpha_at_its_ends() {
     let dynamics = pretrain(Task::Stack, 2).0;
     let fixed = |alpha: f64, warm_start_updates| TrainSettings { alpha: Alpha::Fixed(alpha), warm_start_updates, ..quick() };
