@@ -99,3 +99,27 @@ impl PretrainSettings {
         positive("pretrain.final_learning_rate", self.final_learning_rate)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn counts_out_of_range_are_refused_by_name() {
+        let message = |settings: PretrainSettings| settings.validate().expect_err("refused").to_string();
+        let base = PretrainSettings::default;
+        assert!(base().validate().is_ok());
+        let cases = [
+            (PretrainSettings { steps: 0, ..base() }, "pretrain.steps = 0 is not allowed; it must be from 1 to 100"),
+            (PretrainSettings { ensemble: 101, ..base() }, "pretrain.ensemble = 101 is not allowed; it must be from 1 to 100"),
+            (
+                PretrainSettings { reexecute: 1001, ..base() },
+                "pretrain.reexecute = 1001 is not allowed; it must be from 0 to 1000",
+            ),
+        ];
+        for (settings, expected) in cases {
+            let said = message(settings);
+            assert!(said.contains(expected), "{said}");
+        }
+    }
+}
