@@ -1,6 +1,7 @@
 //! The arithmetic that a network spends its time in: one kernel for all matrix products, which ends with the activation, and what moves
 //! samples into lanes. Each is written once over a `vector` of eight floats and compiled for AVX-512, for AVX2 with FMA and for any
-//! processor; which one runs is found out at run time. The first two give the same bits, the third others in the last places. All `unsafe` code of the library stands in this directory.
+//! processor; which one runs is found out at run time. The first two give the same bits, the third others in the last places. All `unsafe`
+//! code of the library stands in this directory.
 
 #[cfg(target_arch = "x86_64")]
 mod avx2;
