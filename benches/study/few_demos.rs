@@ -18,18 +18,21 @@ const SPARE: u64 = 2;
 pub enum Features {
     /// As the settings say.
     Best,
+    /// The same with joint velocities.
+    Dq,
     /// The state itself, joint velocities included.
     Raw,
 }
 
 impl Features {
     fn name(self) -> &'static str {
-        ["best", "raw"][self as usize]
+        ["best", "dq", "raw"][self as usize]
     }
 
     fn sets(self) -> Vec<String> {
         match self {
             Features::Best => Vec::new(),
+            Features::Dq => vec!["train.mask_dq=false".into()],
             Features::Raw => ["train.features=raw", "train.mask_dq=false"].map(String::from).to_vec(),
         }
     }

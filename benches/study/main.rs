@@ -38,8 +38,8 @@ pub struct Args {
     /// few-demos: numbers of demos
     #[arg(long, value_delimiter = ',', default_values_t = [25, 50, 100])]
     demos: Vec<u64>,
-    /// few-demos: what the policy sees, best (as the settings say) or raw (the state itself)
-    #[arg(long, value_delimiter = ',', default_values = ["best", "raw"])]
+    /// few-demos: what the policy sees: best (as the settings say), dq (with joint velocities), raw (the state itself)
+    #[arg(long, value_delimiter = ',', default_values = ["best", "dq", "raw"])]
     features: Vec<few_demos::Features>,
     /// Methods: bc, sc, hil [default: all; off-track: bc and hil; paper: hil]
     #[arg(long, value_delimiter = ',')]

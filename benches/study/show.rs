@@ -10,7 +10,7 @@ use hilt::report::chart::{Chart, Panel, Point, Series};
 /// Methods in the order of legends and columns, with their names.
 const METHODS: [(&str, &str); 3] = [("bc", "BC"), ("sc", "SC"), ("hil", "HIL")];
 /// Titles of the panels, by the label `features`.
-const PANELS: [(&str, &str); 2] = [("best", "best inputs"), ("raw", "raw state")];
+const PANELS: [(&str, &str); 3] = [("best", "default inputs"), ("dq", "with joint velocities"), ("raw", "raw state")];
 
 /// Successes and episodes of all seeds.
 fn pooled<'a>(rows: impl Iterator<Item = &'a Counted>) -> (u64, u64) {
@@ -52,7 +52,7 @@ pub fn figure(args: &Args) -> Result<()> {
     };
     let panels = PANELS.iter().filter(|(features, _)| rows.iter().any(|r| r.labels[1] == *features)).map(|(features, title)| {
         let series = METHODS.iter().map(|(method, name)| series(features, method, name));
-        Panel { title: (*title).into(), series: series.filter(|s| !s.points.is_empty()).collect() }
+        Panel { title: (*title).into(), series: series.collect() }
     });
     let chart = Chart {
         title: "Stack: success over the number of demos".into(),
