@@ -4,7 +4,7 @@ use super::corpus::{Samples, row};
 use super::policy::Policy;
 use super::shards;
 use crate::config::{ActionChoice, Convergence, Objective, TrainSettings};
-use crate::nn::{BLOCK_PANELS, Pass, blocks, gaussian, panels_of};
+use crate::nn::{Pass, gaussian, panels_of};
 use crate::state::JOINTS;
 use rand::Rng;
 use rand_distr::{Distribution, StandardNormal};
@@ -206,10 +206,7 @@ pub fn policy_gradient(
         }
         shard.pass.d_output.clear_tail(rows);
         policy.net.begin_gradient(&mut shard.pass);
-        for block in blocks(0..panels_of(rows), BLOCK_PANELS) {
-            policy.net.backward(&mut shard.pass, block.clone());
-            policy.net.add_gradient(&mut shard.pass, block);
-        }
+        policy.net.learn(&mut shard.pass, 0..panels_of(rows));
         shard.gradient.resize(policy.net.params().len(), 0.0);
         policy.net.finish_gradient(&shard.pass, &mut shard.gradient);
     });

@@ -82,8 +82,7 @@ impl Shard {
             self.panel_loss(samples, p, rows, loss);
         }
         if learn {
-            net.backward(&mut self.pass, 0..panels);
-            net.add_gradient(&mut self.pass, 0..panels);
+            net.learn(&mut self.pass, 0..panels);
         }
     }
 
@@ -92,8 +91,8 @@ impl Shard {
         let (output, d_output) = (self.pass.output.panel(p), self.pass.d_output.panel_mut(p));
         let target = |lane: usize| row(&samples.targets, output.len(), rows[lane.min(rows.len() - 1)]);
         kernel::interleave(d_output, std::array::from_fn(target));
-        for (target, output) in d_output.iter_mut().zip(output) {
-            target.0[rows.len()..].copy_from_slice(&output.0[rows.len()..]);
+        if rows.len() < LANES {
+            d_output.iter_mut().zip(output).for_each(|(target, output)| target.take_from(rows.len(), *output));
         }
         let mut sum = Lanes::default();
         for ((d, output), weight) in d_output.iter_mut().zip(output).zip(loss.weights) {

@@ -240,8 +240,9 @@ impl Rollout {
         let (segments, mut targets) = (depth.segments(p), [Lanes::default(); BASE_DIM]);
         let target = |i: usize| row(&batch.corpus.next, BASE_DIM, batch.rows[self.segments[i].start + depth.j]);
         kernel::interleave(&mut targets, std::array::from_fn(|lane| target((segments.start + lane).min(segments.end - 1))));
-        for (target, prediction) in targets.iter_mut().zip(self.predictions.panel(at)) {
-            target.0[segments.len()..].copy_from_slice(&prediction.0[segments.len()..]); // no error where there is no segment
+        if segments.len() < LANES {
+            let predictions = self.predictions.panel(at); // no error where there is no segment
+            targets.iter_mut().zip(predictions).for_each(|(target, prediction)| target.take_from(segments.len(), *prediction));
         }
         let (d_state, d_output) = (self.d_states.panel_mut(p), self.model.d_output.panel_mut(at));
         let mut loss = Lanes::default();

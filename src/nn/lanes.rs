@@ -32,6 +32,12 @@ impl Lanes {
         Lanes(std::array::from_fn(|i| f(self.0[i], other.0[i])))
     }
 
+    /// Takes the lanes from `lane` on from `other`.
+    #[inline(always)]
+    pub fn take_from(&mut self, lane: usize, other: Self) {
+        self.0.iter_mut().zip(other.0).skip(lane).for_each(|(to, from)| *to = from);
+    }
+
     /// Sum of the lanes, always in the same order.
     #[inline]
     pub fn sum(self) -> f32 {

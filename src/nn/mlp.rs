@@ -33,10 +33,10 @@ fn steps(panels: Range<usize>) -> impl Iterator<Item = Range<usize>> {
     })
 }
 
-/// A range in blocks of `size`.
-pub fn blocks(panels: Range<usize>, size: usize) -> impl Iterator<Item = Range<usize>> {
+/// Panels in blocks of [`BLOCK_PANELS`].
+fn blocks(panels: Range<usize>) -> impl Iterator<Item = Range<usize>> {
     let end = panels.end;
-    panels.step_by(size).map(move |from| from..end.min(from + size))
+    panels.step_by(BLOCK_PANELS).map(move |from| from..end.min(from + BLOCK_PANELS))
 }
 
 impl Mlp {
@@ -195,13 +195,28 @@ impl Mlp {
 
     /// Adds these panels to the sum, after [`Mlp::backward`].
     pub fn add_gradient(&self, pass: &mut Pass, panels: Range<usize>) {
-        for block in blocks(panels, BLOCK_PANELS) {
-            for layer in 0..self.layers() {
-                let (inputs, outputs) = (self.widths[layer], self.widths[layer + 1]);
-                let x = if layer == 0 { &pass.input } else { &pass.hidden[layer - 1] };
-                let dy = if layer + 1 == self.layers() { &pass.d_output } else { &pass.d_hidden[layer] };
-                pass.sums.add(layer, x.span(&block), inputs, dy.span(&block), outputs);
+        blocks(panels).for_each(|block| self.add_block(pass, &block, &block));
+    }
+
+    /// [`Mlp::backward`] and [`Mlp::add_gradient`] in one, where nothing else is wanted of the gradients of the hidden layers: they are
+    /// soon overwritten, so that they need not leave the cache.
+    pub fn learn(&self, pass: &mut Pass, panels: Range<usize>) {
+        for block in blocks(panels) {
+            for places in steps(0..block.len()) {
+                let step = block.start + places.start..block.start + places.end;
+                self.backward_block(pass, &step, &places);
             }
+            self.add_block(pass, &block, &(0..block.len()));
+        }
+    }
+
+    /// Adds at most [`BLOCK_PANELS`] panels to the sum; the gradients of the hidden layers lie in `places`.
+    fn add_block(&self, pass: &mut Pass, panels: &Range<usize>, places: &Range<usize>) {
+        for layer in 0..self.layers() {
+            let (inputs, outputs) = (self.widths[layer], self.widths[layer + 1]);
+            let x = if layer == 0 { &pass.input } else { &pass.hidden[layer - 1] };
+            let dy = if layer + 1 == self.layers() { pass.d_output.span(panels) } else { pass.d_hidden[layer].span(places) };
+            pass.sums.add(layer, x.span(panels), inputs, dy, outputs);
         }
     }
 

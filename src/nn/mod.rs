@@ -15,5 +15,5 @@ mod pass;
 pub use activation::Activation;
 pub use adam::{Adam, Ema, clip_by_global_norm, cosine, global_norm};
 pub use lanes::{LANES, Lanes, Panels, panels_of};
-pub use mlp::{Mlp, blocks};
+pub use mlp::Mlp;
 pub use pass::{BLOCK_PANELS, Pass};

@@ -1,7 +1,7 @@
 //! The workspace of forward and backward.
 
 use super::Mlp;
-use super::kernel::{Coefficients, Finish, Product, Start, product, transpose};
+use super::kernel::{Coefficients, Finish, Product, Start, product, separate, transpose};
 use super::lanes::{LANES, Lanes, Panels, panels_of};
 
 /// Panels that had best go through forward, backward and the gradient before the next do: their activations then wait in a core's second
@@ -103,8 +103,11 @@ impl GradientSums {
             return gradient.fill(0.0);
         }
         for (rows, sums) in gradient.chunks_mut(LANES * outputs).zip(self.layers[layer].chunks_exact(outputs)) {
-            for (l, row) in rows.chunks_exact_mut(outputs).enumerate() {
-                row.iter_mut().zip(sums).for_each(|(d, sum)| *d = sum.0[l]);
+            let mut each = rows.chunks_exact_mut(outputs);
+            if each.len() == LANES {
+                separate(std::array::from_fn(|_| each.next().expect("eight rows")), sums);
+            } else {
+                each.enumerate().for_each(|(l, row)| row.iter_mut().zip(sums).for_each(|(d, sum)| *d = sum.0[l]));
             }
         }
     }

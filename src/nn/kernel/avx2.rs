@@ -23,6 +23,11 @@ impl Vector for __m256 {
         unsafe { _mm256_store_ps(to.cast(), self) }
     }
     #[inline(always)]
+    unsafe fn store_row(self, to: *mut f32) {
+        // SAFETY: the caller's.
+        unsafe { _mm256_storeu_ps(to, self) }
+    }
+    #[inline(always)]
     unsafe fn splat(value: f32) -> Self {
         // SAFETY: the processor has AVX2, here and below.
         unsafe { _mm256_set1_ps(value) }
@@ -134,4 +139,12 @@ pub fn transpose(to: &mut [Lanes], from: &[Lanes], entries: usize) {
 pub unsafe fn interleave(panel: &mut [Lanes], rows: [&[f32]; LANES]) {
     // SAFETY: the caller's.
     unsafe { super::entries::interleave::<__m256>(panel, rows) }
+}
+
+/// # Safety
+/// As [`super::entries::separate`].
+#[target_feature(enable = "avx2,fma")]
+pub unsafe fn separate(rows: [&mut [f32]; LANES], panel: &[Lanes]) {
+    // SAFETY: the caller's.
+    unsafe { super::entries::separate::<__m256>(rows, panel) }
 }

@@ -86,3 +86,20 @@ pub unsafe fn interleave<T: Vector>(panel: &mut [Lanes], rows: [&[f32]; LANES]) 
         }
     }
 }
+
+/// # Safety
+/// As [`interleave`].
+#[inline(always)]
+pub unsafe fn separate<T: Vector>(rows: [&mut [f32]; LANES], panel: &[Lanes]) {
+    let Some(last) = panel.len().checked_sub(LANES) else {
+        return rows.into_iter().enumerate().for_each(|(r, row)| row.iter_mut().zip(panel).for_each(|(v, entry)| *v = entry.0[r]));
+    };
+    let rows = rows.map(|row| row.as_mut_ptr());
+    for from in (0..last).step_by(LANES).chain([last]) {
+        // SAFETY: as above.
+        unsafe {
+            let turned = T::transposed(std::array::from_fn(|k| T::load(&panel[from + k])));
+            rows.iter().zip(turned).for_each(|(row, v)| v.store_row(row.add(from)));
+        }
+    }
+}

@@ -160,6 +160,26 @@ fn interleave_on(path: Path, panel: &mut [Lanes], rows: [&[f32]; LANES]) {
     }
 }
 
+/// The eight rows of a panel, each by itself: the inverse of [`interleave`].
+///
+/// # Panics
+/// When a row is shorter than the panel.
+pub fn separate(rows: [&mut [f32]; LANES], panel: &[Lanes]) {
+    separate_on(Path::best(), rows, panel);
+}
+
+fn separate_on(path: Path, rows: [&mut [f32]; LANES], panel: &[Lanes]) {
+    let rows = rows.map(|row| &mut row[..panel.len()]);
+    // SAFETY: as above.
+    unsafe {
+        match path {
+            #[cfg(target_arch = "x86_64")]
+            Path::Avx512 | Path::Avx2 => avx2::separate(rows, panel),
+            Path::Portable => entries::separate::<Lanes>(rows, panel),
+        }
+    }
+}
+
 /// Which compilation runs.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Path {

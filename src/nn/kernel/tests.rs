@@ -143,7 +143,7 @@ fn finishes_are_functions_of_the_plain_product() {
 }
 
 #[test]
-fn interleaving_puts_rows_into_lanes() {
+fn interleaving_puts_rows_into_lanes_and_separating_takes_them_out() {
     for path in paths() {
         for entries in [0, 1, 7, 8, 9, 16, 53] {
             let rows: [Vec<f32>; LANES] = std::array::from_fn(|r| (0..entries + 2).map(|i| value(100 * r + i)).collect());
@@ -151,6 +151,11 @@ fn interleaving_puts_rows_into_lanes() {
             interleave_on(path, &mut panel, std::array::from_fn(|r| rows[r].as_slice()));
             for (i, r) in (0..entries).flat_map(|i| (0..LANES).map(move |r| (i, r))) {
                 assert_eq!(panel[i].0[r], rows[r][i], "{path:?}, row {r}, entry {i} of {entries}");
+            }
+            let mut back = rows.clone().map(|row| vec![9.0; row.len()]);
+            separate_on(path, back.each_mut().map(Vec::as_mut_slice), &panel);
+            for (row, back) in rows.iter().zip(&back) {
+                assert_eq!((&row[..entries], &back[entries..]), (&back[..entries], &[9.0, 9.0][..]), "{path:?}, {entries} entries");
             }
         }
     }

@@ -12,6 +12,8 @@ pub trait Vector: Copy {
     /// Eight floats, not aligned.
     unsafe fn load_row(from: *const f32) -> Self;
     unsafe fn store(self, to: *mut Lanes);
+    /// Eight floats, not aligned.
+    unsafe fn store_row(self, to: *mut f32);
     unsafe fn splat(value: f32) -> Self;
     /// self + other.
     unsafe fn add(self, other: Self) -> Self;
@@ -79,6 +81,11 @@ impl Vector for Lanes {
     unsafe fn store(self, to: *mut Lanes) {
         // SAFETY: the caller's.
         unsafe { *to = self }
+    }
+    #[inline(always)]
+    unsafe fn store_row(self, to: *mut f32) {
+        // SAFETY: as `load_row`.
+        unsafe { *to.cast::<[f32; LANES]>() = self.0 }
     }
     #[inline(always)]
     unsafe fn splat(value: f32) -> Self {
