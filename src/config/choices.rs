@@ -79,6 +79,19 @@ pub enum StateScale {
     Step,
 }
 
+/// Which commands of the fingers L_SC teaches.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum FingerCloning {
+    /// All.
+    All,
+    /// Those that the demo's finger followed. A finger that holds the block does not answer to its command, but the dynamics network
+    /// believes that it does.
+    Following,
+    /// None; L_SC leaves out the fingers' states too.
+    None,
+}
+
 /// Which pairs enter the buffer B of Algorithm 3.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]

@@ -11,7 +11,9 @@ mod ranges;
 mod scene;
 mod train;
 
-pub use choices::{ActionChoice, Alpha, Convergence, FeatureSet, ModelLoss, Objective, Pairs, StateScale, Structure};
+pub use choices::{
+    ActionChoice, Alpha, Convergence, FeatureSet, FingerCloning, ModelLoss, Objective, Pairs, StateScale, Structure,
+};
 pub use data::{ConvertSettings, EvaluateSettings};
 pub use load::{Preset, Source};
 pub use pretrain::PretrainSettings;

@@ -1,6 +1,6 @@
 //! Settings of the policy. Defaults are the preset `best`; the literal preset of the paper sets the keys that differ.
 
-use super::choices::{ActionChoice, Alpha, Convergence, FeatureSet, Objective, Pairs, StateScale};
+use super::choices::{ActionChoice, Alpha, Convergence, FeatureSet, FingerCloning, Objective, Pairs, StateScale};
 use super::limits::{at_least_one, network, optimiser, positive, pulses, refuse, unit};
 use super::ranges::MOST_EPISODES;
 use super::scene::PulseSettings;
@@ -47,9 +47,8 @@ pub struct TrainSettings {
     pub sc_scale: StateScale,
     /// Whether L_SC leaves out joint velocities. They repeat the action: with them, coming back to the path costs as much as leaving it.
     pub sc_mask_dq: bool,
-    /// Whether L_SC leaves the fingers to L_BC: neither their states nor their commands take part. When to open depends on millimetres,
-    /// but L_SC asks for it at a time.
-    pub sc_mask_fingers: bool,
+    /// Which commands of the fingers L_SC teaches; L_BC teaches all.
+    pub sc_fingers: FingerCloning,
     /// Error, in units of `sc_scale`, beyond which L_SC grows as a line instead of a parabola; 0 = never. Without it the few large
     /// errors after a push outweigh the millimetres that decide a release.
     pub sc_knee: f64,
@@ -111,7 +110,7 @@ impl Default for TrainSettings {
             rho: 0.3,
             sc_scale: StateScale::Step,
             sc_mask_dq: true,
-            sc_mask_fingers: false,
+            sc_fingers: FingerCloning::Following,
             sc_knee: 0.3,
             sc_balance: true,
             sc_noise_variance: 0.001,

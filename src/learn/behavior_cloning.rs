@@ -4,7 +4,7 @@ use super::corpus::{Samples, row};
 use super::policy::Policy;
 use super::shards;
 use crate::config::{ActionChoice, Convergence, Objective, TrainSettings};
-use crate::nn::{Pass, gaussian, panels_of};
+use crate::nn::{LANES, Lanes, Panels, Pass, gaussian, panels_of};
 use crate::state::JOINTS;
 use rand::Rng;
 use rand_distr::{Distribution, StandardNormal};
@@ -61,8 +61,10 @@ pub struct Workspace {
 #[derive(Default)]
 struct Shard {
     pass: Pass,
-    d_bc: Vec<f32>,
-    gradient: Vec<f32>,
+    rows: usize,
+    /// Gradient of L_BC with respect to the mean actions, standardised.
+    d_bc: Panels,
+    noise: Panels,
     loss: f64,
     agreement: f64,
     residual2: [f32; JOINTS],
@@ -104,12 +106,9 @@ impl Workspace {
     pub fn new(policy: &Policy, most_rows: usize) -> Self {
         let rows = shards::most_rows(most_rows);
         let shard = || {
-            let mut shard = Shard {
-                d_bc: Vec::with_capacity(rows * JOINTS),
-                gradient: vec![0.0; policy.net.params().len()],
-                ..Shard::default()
-            };
+            let mut shard = Shard::default();
             shard.pass.provide(&policy.net, panels_of(rows));
+            [&mut shard.d_bc, &mut shard.noise].into_iter().for_each(|array| array.provide(JOINTS, panels_of(rows)));
             shard
         };
         Workspace {
@@ -130,32 +129,45 @@ impl Shard {
             Objective::RawSum => (std::array::from_fn(|i| unit[i] * unit[i]), 1.0 / batch.demos as f32),
             Objective::StandardisedMean => ([1.0; JOINTS], 1.0 / (batch.rows.len() * JOINTS) as f32),
         };
-        self.d_bc.resize(rows.len() * JOINTS, 0.0);
-        (self.loss, self.agreement) = (0.0, 0.0);
+        let sampled = choices.action == ActionChoice::Sample;
+        let panels = panels_of(rows.len());
+        (self.rows, self.loss, self.agreement) = (rows.len(), 0.0, 0.0);
         (self.residual2, self.d_log_std) = ([0.0; JOINTS], [0.0; JOINTS]);
-        for (slot, r) in rows.iter().enumerate() {
-            let (label, at) = (row(&batch.samples.targets, JOINTS, *r), slot * JOINTS);
-            let eps = noise.get(at..at + JOINTS);
-            let (mut loss, mut error2) = (0.0f32, 0.0f32);
+        self.d_bc.reserve(JOINTS, panels);
+        self.d_bc.write_rows(0, rows.len(), |slot| row(&batch.samples.targets, JOINTS, rows[slot]));
+        if !noise.is_empty() {
+            self.noise.reserve(JOINTS, panels);
+            self.noise.write_rows(0, rows.len(), |slot| row(noise, JOINTS, slot));
+        }
+        for (p, rows) in rows.chunks(LANES).enumerate() {
+            let (mut loss, mut error2) = (Lanes::default(), Lanes::default());
             for i in 0..JOINTS {
-                let residual = self.pass.output.get(slot, i) - label[i];
-                let shift = match (choices.action, eps) {
-                    (ActionChoice::Sample, Some(eps)) => sigma[i] * eps[i],
-                    _ => 0.0,
-                };
+                let (label, mut mean) = (&mut self.d_bc.panel_mut(p)[i], self.pass.output.panel(p)[i]);
+                if rows.len() < LANES {
+                    mean.take_from(rows.len(), *label); // no error where there is no row
+                }
+                let residual = mean - *label;
+                let shift = if sampled { self.noise.panel(p)[i] * sigma[i] } else { Lanes::default() };
                 let error = residual + shift;
-                let slope = 2.0 * scale * weight[i] * error;
-                loss += weight[i] * error * error;
+                let slope = error * (2.0 * scale * weight[i]);
+                loss += error * weight[i] * error;
                 error2 += residual * residual;
-                self.residual2[i] += residual * residual;
-                self.d_bc[at + i] = slope;
-                self.d_log_std[i] += slope * shift;
+                self.residual2[i] += (residual * residual).sum();
+                self.d_log_std[i] += (slope * shift).sum();
+                *label = slope;
             }
-            self.loss += f64::from(scale * loss);
-            self.agreement += match (choices.convergence, eps) {
-                (Convergence::SampledDensity, Some(eps)) => gaussian::sample_density(&policy.log_std, unit, eps),
-                _ => f64::from((-0.5 * error2 / (JOINTS as f32 * choices.tau * choices.tau)).exp()),
-            };
+            self.loss += loss.0.iter().map(|loss| f64::from(scale * loss)).sum::<f64>();
+            for lane in 0..rows.len() {
+                self.agreement += match choices.convergence {
+                    Convergence::SampledDensity => {
+                        let eps: [f32; JOINTS] = std::array::from_fn(|i| self.noise.panel(p)[i].0[lane]);
+                        gaussian::sample_density(&policy.log_std, unit, &eps)
+                    }
+                    Convergence::Agreement => {
+                        f64::from((-0.5 * error2.0[lane] / (JOINTS as f32 * choices.tau * choices.tau)).exp())
+                    }
+                };
+            }
         }
     }
 }
@@ -170,9 +182,9 @@ impl Workspace {
             cloned.d_conv += shard.agreement / rows as f64;
             shards::add_scaled(&mut residual2, &shard.residual2, 1.0 / rows as f32);
             shards::add_scaled(&mut self.d_log_std, &shard.d_log_std, 1.0);
-            for slot in 0..shard.d_bc.len() / JOINTS {
-                self.mean.extend((0..JOINTS).map(|i| shard.pass.output.get(slot, i)));
-            }
+            let from = self.mean.len();
+            self.mean.resize(from + shard.rows * JOINTS, 0.0);
+            shard.pass.output.read_rows(&mut self.mean[from..]);
         }
         if action == ActionChoice::Mean {
             gaussian::add_nll_gradient(&policy.log_std, &residual2, &mut self.d_log_std);
@@ -194,24 +206,24 @@ pub fn policy_gradient(
     let mut from = 0;
     let parts = work.shards[..work.active].iter_mut().map(|shard| {
         let start = from;
-        from += shard.d_bc.len();
+        from += shard.rows * JOINTS;
         (shard, d_first.get(start..from))
     });
     let mut parts: [Option<_>; shards::MAX_SHARDS] = collect_array(parts);
     parts.par_iter_mut().flatten().for_each(|(shard, d_first)| {
-        let rows = shard.d_bc.len() / JOINTS;
-        for (at, bc) in shard.d_bc.iter().enumerate() {
-            let first = d_first.map_or(0.0, |d_first| first_weight * d_first[at]);
-            shard.pass.d_output.set(at / JOINTS, at % JOINTS, bc_weight * bc + first);
+        let (rows, d_output) = (shard.rows, &mut shard.pass.d_output);
+        let panels = 0..panels_of(rows);
+        match d_first {
+            Some(d_first) => d_output.write_rows(0, rows, |slot| row(d_first, JOINTS, slot)),
+            None => d_output.span_mut(&panels).fill(Lanes::default()),
         }
-        shard.pass.d_output.clear_tail(rows);
+        for (slot, bc) in d_output.span_mut(&panels).iter_mut().zip(shard.d_bc.span(&panels)) {
+            *slot = *bc * bc_weight + *slot * first_weight;
+        }
         policy.net.begin_gradient(&mut shard.pass);
         policy.net.learn(&mut shard.pass, 0..panels_of(rows));
-        shard.gradient.resize(policy.net.params().len(), 0.0);
-        policy.net.finish_gradient(&shard.pass, &mut shard.gradient);
     });
-    gradient.fill(0.0);
-    work.shards[..work.active].iter().for_each(|shard| shards::add_scaled(gradient, &shard.gradient, 1.0));
+    policy.net.finish_gradient(work.shards[..work.active].iter_mut().map(|shard| &mut shard.pass), gradient);
 }
 
 fn collect_array<T, const N: usize>(items: impl Iterator<Item = T>) -> [Option<T>; N] {

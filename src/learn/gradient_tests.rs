@@ -9,11 +9,12 @@ use super::shards::add_scaled;
 use super::state_cloning::{self as sc, Segment, draw_segments, state_cloning};
 use super::testing::demos;
 use crate::config::{
-    ActionChoice, FeatureSet, Objective, Pairs, PretrainSettings, PulseSettings, StateScale, Structure, TrainSettings,
+    ActionChoice, FeatureSet, FingerCloning, Objective, Pairs, PretrainSettings, PulseSettings, StateScale, Structure,
+    TrainSettings,
 };
 use crate::nn::{Activation, LANES, Lanes, Pass};
 use crate::seed::stream;
-use crate::state::{BASE_DIM, JOINTS};
+use crate::state::{ARM_JOINTS, BASE_DIM, FINGERS, JOINTS};
 use crate::tasks::Task;
 use rand::RngExt;
 
@@ -273,7 +274,8 @@ fn step_by_step(world: &World, gradient: &mut [f32]) -> f64 {
                 let base = if known { d_next[k] * 0.05 + d_next[JOINTS + k] } else { Lanes::default() };
                 let d_action = f.d_input.panel(t)[seen + k] / dynamics.action_scaling().std[k] + base;
                 let d_mean = d_action * policy.action_scaling().std[k];
-                pi.d_output.panel_mut(t)[k] = if k < choices.taught { d_mean } else { Lanes::default() };
+                let taught = k < ARM_JOINTS || row(&choices.taught, FINGERS, rows.start + t)[k - ARM_JOINTS] == 1.0;
+                pi.d_output.panel_mut(t)[k] = if taught { d_mean } else { Lanes::default() };
             }
             policy.net.backward(&mut pi, t..t + 1);
             policy.net.backward_input(&mut pi, t..t + 1);
@@ -290,7 +292,7 @@ fn step_by_step(world: &World, gradient: &mut [f32]) -> f64 {
         policy.net.begin_gradient(&mut pi);
         policy.net.add_gradient(&mut pi, 0..steps);
         let mut of_demo = vec![0.0; gradient.len()];
-        policy.net.finish_gradient(&pi, &mut of_demo);
+        policy.net.finish_gradient([&mut pi], &mut of_demo);
         add_scaled(gradient, &of_demo, 1.0);
         at += steps;
     }
@@ -299,7 +301,7 @@ fn step_by_step(world: &World, gradient: &mut [f32]) -> f64 {
 
 #[test]
 fn batched_segments_equal_algorithm_3_step_by_step() {
-    let masked = small(TrainSettings { sc_mask_fingers: true, ..Default::default() });
+    let masked = small(TrainSettings { sc_fingers: FingerCloning::None, ..Default::default() });
     let masked = ("fingers left out", world(Task::Stack, Structure::Kinematic, masked));
     for (name, world) in sc_worlds().into_iter().chain([masked]) {
         let (mut batched, mut plain) = (Vec::new(), vec![0.0; world.policy.net.params().len()]);

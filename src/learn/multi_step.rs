@@ -33,7 +33,6 @@ struct Shard {
     rows: Panels,
     /// Gradient with respect to the states of one depth.
     d_states: Panels,
-    gradient: Vec<f32>,
     loss: f64,
 }
 
@@ -54,14 +53,9 @@ impl MultiStep {
             shard.deal(horizons(corpus, &rows[shards::range(rows.len(), active, i)], steps));
             shard.run(dynamics, corpus, loss);
         });
-        self.gradient.clear();
         self.gradient.resize(dynamics.net.params().len(), 0.0);
-        let mut total = 0.0;
-        for shard in &self.shards[..active] {
-            total += shard.loss;
-            shards::add_scaled(&mut self.gradient, &shard.gradient, 1.0);
-        }
-        total
+        dynamics.net.finish_gradient(self.shards[..active].iter_mut().map(|shard| &mut shard.pass), &mut self.gradient);
+        self.shards[..active].iter().map(|shard| shard.loss).sum()
     }
 }
 
@@ -99,8 +93,6 @@ impl Shard {
         }
         dynamics.net.begin_gradient(&mut self.pass);
         dynamics.net.add_gradient(&mut self.pass, 0..panels);
-        self.gradient.resize(dynamics.net.params().len(), 0.0);
-        dynamics.net.finish_gradient(&self.pass, &mut self.gradient);
     }
 
     /// One step of all rollouts that reach depth `j`.

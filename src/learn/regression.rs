@@ -30,7 +30,6 @@ pub struct Regression {
 #[derive(Default)]
 struct Shard {
     pass: Pass,
-    gradient: Vec<f32>,
     loss: f64,
 }
 
@@ -43,16 +42,11 @@ impl Regression {
         self.shards[..active].par_iter_mut().enumerate().for_each(|(i, shard)| {
             shard.run(net, samples, &rows[shards::range(rows.len(), active, i)], loss, learn);
         });
-        self.gradient.resize(net.params().len(), 0.0);
-        self.gradient.fill(0.0);
-        let mut total = 0.0;
-        for shard in &self.shards[..active] {
-            total += shard.loss;
-            if learn {
-                shards::add_scaled(&mut self.gradient, &shard.gradient, 1.0);
-            }
+        if learn {
+            self.gradient.resize(net.params().len(), 0.0);
+            net.finish_gradient(self.shards[..active].iter_mut().map(|shard| &mut shard.pass), &mut self.gradient);
         }
-        total
+        self.shards[..active].iter().map(|shard| shard.loss).sum()
     }
 }
 
@@ -60,7 +54,6 @@ impl Shard {
     fn reserve(&mut self, net: &Mlp) {
         self.pass.provide(net, BLOCK_PANELS);
         self.pass.reserve(net, BLOCK_PANELS);
-        self.gradient.resize(net.params().len(), 0.0);
     }
 
     fn run(&mut self, net: &Mlp, samples: &Samples, rows: &[usize], loss: &Loss, learn: bool) {
@@ -68,9 +61,6 @@ impl Shard {
         net.begin_gradient(&mut self.pass);
         for rows in rows.chunks(BLOCK_PANELS * LANES) {
             self.block(net, samples, rows, loss, learn);
-        }
-        if learn {
-            net.finish_gradient(&self.pass, &mut self.gradient);
         }
     }
 

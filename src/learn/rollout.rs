@@ -12,8 +12,13 @@ use super::regression::bend;
 use super::state_cloning::{Batch, Choices, Segment};
 use crate::config::{ActionChoice, Structure};
 use crate::nn::{LANES, Lanes, Panels, Pass, kernel, panels_of};
-use crate::state::{BASE_DIM, JOINTS};
+use crate::state::{ARM_JOINTS, BASE_DIM, FINGERS, JOINTS};
 use std::ops::Range;
+
+/// Steps of a group of segments: what it keeps for the way back, some 4 kB a step, then waits in a core's second cache.
+const GROUP_STEPS: usize = 240;
+/// Segments that a group is made of, as many at a time: they fill the largest tile of a product.
+const GROUP_SEGMENTS: usize = 32;
 
 /// The workspace of one shard.
 #[derive(Default)]
@@ -21,7 +26,8 @@ pub struct Rollout {
     segments: Vec<Segment>,
     /// Segments under way at each depth.
     counts: Vec<usize>,
-    policy: Pass,
+    /// The policy's passes; holds the gradient of its parameters, first actions left out.
+    pub policy: Pass,
     model: Pass,
     /// States at all depths.
     states: Panels,
@@ -33,14 +39,16 @@ pub struct Rollout {
     noise: Panels,
     /// Disturbances at the current depth \[rad/s\].
     pushes: Panels,
+    /// Which fingers' commands are taught at the current depth.
+    taught: Panels,
     /// Predictions at all depths.
     predictions: Panels,
     /// Gradient with respect to the states at the current depth.
     d_states: Panels,
     /// Gradient with respect to each segment's first mean action.
     d_first: Panels,
-    /// Gradient with respect to the policy's parameters, first actions left out.
-    pub gradient: Vec<f32>,
+    /// The same of all groups so far, with the transition that it belongs to.
+    first_actions: Vec<(usize, [f32; JOINTS])>,
     /// Gradient with respect to the log standard deviations.
     pub d_log_std: [f32; JOINTS],
     /// This shard's part of L_SC.
@@ -72,15 +80,34 @@ impl Depth {
     }
 }
 
+/// Segments, longest first, in groups that advance together.
+fn groups(segments: &[Segment]) -> impl Iterator<Item = &[Segment]> {
+    let mut rest = segments;
+    std::iter::from_fn(move || {
+        let (mut size, mut steps) = (0, 0);
+        while size < rest.len() && steps < GROUP_STEPS {
+            let more = &rest[size..rest.len().min(size + GROUP_SEGMENTS)];
+            (size, steps) = (size + more.len(), steps + more.iter().map(|s| s.steps).sum::<usize>());
+        }
+        let (group, after) = rest.split_at(size);
+        rest = after;
+        (size > 0).then_some(group)
+    })
+}
+
 impl Rollout {
     /// Allocates for any segments of `rows` transitions, none of more than `longest` steps.
     pub fn provide(&mut self, policy: &Policy, dynamics: &Dynamics, rows: usize, longest: usize) {
+        self.first_actions.clear();
+        self.first_actions.reserve(rows);
+        let rows = rows.min(GROUP_STEPS + GROUP_SEGMENTS * longest);
         let (first, panels) = (panels_of(rows), panels_of(rows) + longest); // each depth may leave one panel half empty
         self.policy.provide(&policy.net, panels);
         self.model.provide(&dynamics.net, panels);
         self.states.provide(dynamics.task().state_dim(), panels);
         self.predictions.provide(BASE_DIM, panels);
         self.d_states.provide(BASE_DIM, first);
+        self.taught.provide(FINGERS, first);
         [&mut self.actions, &mut self.noise, &mut self.pushes, &mut self.d_first]
             .into_iter()
             .for_each(|array| array.provide(JOINTS, first));
@@ -89,11 +116,10 @@ impl Rollout {
         self.segments.reserve(rows);
         self.counts.clear();
         self.counts.reserve(longest);
-        self.gradient.resize(policy.net.params().len(), 0.0);
     }
 
-    /// Takes in segments, sorted by length, longest first.
-    pub fn deal(&mut self, segments: &[Segment]) {
+    /// Takes in a group.
+    fn deal(&mut self, segments: &[Segment]) {
         self.segments.clear();
         self.segments.extend_from_slice(segments);
         self.counts.clear();
@@ -110,8 +136,18 @@ impl Rollout {
         Depth { j, from, later, panels: panels_of(self.counts[j]), count: self.counts[j], next_count }
     }
 
-    /// Loss and gradient of the segments.
-    pub fn run(&mut self, policy: &Policy, dynamics: &Dynamics, batch: Batch, choices: &Choices) {
+    /// Loss and gradient of segments, sorted by length, longest first.
+    pub fn run(&mut self, segments: &[Segment], policy: &Policy, dynamics: &Dynamics, batch: Batch, choices: &Choices) {
+        (self.loss, self.d_log_std) = (0.0, [0.0; JOINTS]);
+        self.first_actions.clear();
+        policy.net.begin_gradient(&mut self.policy);
+        for group in groups(segments) {
+            self.deal(group);
+            self.run_group(policy, dynamics, batch, choices);
+        }
+    }
+
+    fn run_group(&mut self, policy: &Policy, dynamics: &Dynamics, batch: Batch, choices: &Choices) {
         self.prepare(policy, dynamics, batch);
         for j in 0..self.counts.len() {
             self.advance(self.depth(j), policy, dynamics, batch, choices);
@@ -119,10 +155,12 @@ impl Rollout {
         for j in (0..self.counts.len()).rev() {
             self.retrace(self.depth(j), policy, dynamics, batch, choices);
         }
-        let later = self.hands.len() - panels_of(self.segments.len());
-        policy.net.begin_gradient(&mut self.policy);
-        policy.net.add_gradient(&mut self.policy, 0..later);
-        policy.net.finish_gradient(&self.policy, &mut self.gradient);
+        policy.net.add_gradient(&mut self.policy, 0..self.hands.len() - panels_of(self.segments.len()));
+        for (i, segment) in self.segments.iter().enumerate() {
+            let mut d_first = [0.0; JOINTS];
+            self.d_first.read_row(i, &mut d_first);
+            self.first_actions.push((segment.start, d_first));
+        }
     }
 
     fn prepare(&mut self, policy: &Policy, dynamics: &Dynamics, batch: Batch) {
@@ -137,9 +175,8 @@ impl Rollout {
             array.reserve(JOINTS, first);
         }
         self.d_states.reserve(BASE_DIM, first);
+        self.taught.reserve(FINGERS, first);
         self.d_states.span_mut(&(0..first)).fill(Lanes::default());
-        self.d_log_std = [0.0; JOINTS];
-        self.loss = 0.0;
         let demo_row = |i: usize| batch.rows[self.segments[i].start];
         self.states.write_rows(0, self.segments.len(), |i| batch.corpus.state(demo_row(i)));
         let inputs = |i: usize| row(batch.model_inputs, dynamics.inputs(), demo_row(i));
@@ -260,17 +297,21 @@ impl Rollout {
     fn retrace_actions(&mut self, depth: Depth, policy: &Policy, dynamics: &Dynamics, batch: Batch, choices: &Choices) {
         let seen = dynamics.features().width();
         let kinematic = dynamics.structure() == Structure::Kinematic;
+        let segments = &self.segments;
+        let taught = |i: usize| row(&choices.taught, FINGERS, batch.rows[segments[i].start + depth.j]);
+        self.taught.write_rows(0, depth.count, taught);
         if choices.action == ActionChoice::Sample {
-            let segments = &self.segments;
             self.noise.write_rows(0, depth.count, |i| row(batch.noise, JOINTS, segments[i].start + depth.j));
         }
         for (p, at, later) in depth.places() {
             let (d_given, d_state) = (&self.model.d_input.panel(at)[seen..], self.d_states.panel(p));
             let d_mean = if depth.j == 0 { self.d_first.panel_mut(p) } else { self.policy.d_output.panel_mut(later) };
-            d_mean[choices.taught..].fill(Lanes::default());
-            for k in 0..choices.taught {
+            for k in 0..JOINTS {
                 let known = if kinematic { d_state[k] * DT_S + d_state[JOINTS + k] } else { Lanes::default() };
                 d_mean[k] = (d_given[k] / dynamics.action_scaling().std[k] + known) * policy.action_scaling().std[k];
+                if k >= ARM_JOINTS {
+                    d_mean[k] = d_mean[k] * self.taught.panel(p)[k - ARM_JOINTS];
+                }
                 if choices.action == ActionChoice::Sample {
                     self.d_log_std[k] += (d_mean[k] * self.noise.panel(p)[k]).sum() * policy.log_std[k].exp();
                 }
@@ -280,8 +321,8 @@ impl Rollout {
 
     /// Adds the gradient with respect to the first mean actions to `d_first` (rows of the batch x 9).
     pub fn scatter_first(&self, d_first: &mut [f32]) {
-        for (i, segment) in self.segments.iter().enumerate() {
-            self.d_first.read_row(i, &mut d_first[segment.start * JOINTS..(segment.start + 1) * JOINTS]);
+        for (start, first) in &self.first_actions {
+            d_first[start * JOINTS..(start + 1) * JOINTS].copy_from_slice(first);
         }
     }
 }

@@ -4,14 +4,14 @@
 //! that begin at demo states, and the segments of all demos advance together as rows of one matrix. Sequential depth is the longest
 //! segment. The first action of a segment is the policy's action in a demo state, which behavior cloning has already computed.
 
-use super::corpus::Corpus;
-use super::dynamics::{Dynamics, STEP_FLOOR};
+use super::corpus::{Corpus, row};
+use super::dynamics::{DT_S, Dynamics, STEP_FLOOR};
 use super::policy::Policy;
 use super::rollout::Rollout;
 use super::scaling::Scaling;
 use super::shards;
-use crate::config::{ActionChoice, Objective, Pairs, StateScale, TrainSettings};
-use crate::state::{ARM_JOINTS, BASE_DIM, JOINTS};
+use crate::config::{ActionChoice, FingerCloning, Objective, Pairs, StateScale, TrainSettings};
+use crate::state::{ARM_JOINTS, BASE_DIM, FINGERS, JOINTS};
 use rand::{Rng, RngExt};
 use rayon::prelude::*;
 
@@ -54,12 +54,30 @@ pub fn draw_segments(
     }
 }
 
+/// Share of the commanded motion that a finger may miss and still count as one that follows. Held fingers miss all of it, free ones a
+/// few percent.
+const FOLLOWING: f32 = 0.5;
+
+/// Which fingers' commands L_SC teaches in transition `r`: 1, or 0.
+fn taught_fingers(fingers: FingerCloning, corpus: &Corpus, r: usize) -> [f32; FINGERS] {
+    std::array::from_fn(|finger| {
+        let i = ARM_JOINTS + finger;
+        let commanded = DT_S * row(&corpus.executed, JOINTS, r)[i];
+        let missed = row(&corpus.next, BASE_DIM, r)[i] - corpus.state(r)[i] - commanded;
+        f32::from(match fingers {
+            FingerCloning::All => true,
+            FingerCloning::Following => missed.abs() <= FOLLOWING * commanded.abs(),
+            FingerCloning::None => false,
+        })
+    })
+}
+
 /// What does not change from update to update.
 pub struct Choices {
     /// Weight of each state entry's squared error.
     pub weights: [f32; BASE_DIM],
-    /// Actions that the gradient reaches: all nine, or those of the arm.
-    pub taught: usize,
+    /// 1 where the gradient reaches a finger's command, else 0: transitions x 3.
+    pub taught: Vec<f32>,
     /// Error of each state entry beyond which the loss is a line.
     pub knees: [f32; BASE_DIM],
     /// Whether L_SC is a sum over a demo instead of a mean.
@@ -87,13 +105,13 @@ impl Choices {
         };
         let velocity = |i: usize| (JOINTS..2 * JOINTS).contains(&i);
         let finger = |i: usize| i < 2 * JOINTS && i % JOINTS >= ARM_JOINTS;
-        let masked = |i: usize| settings.sc_mask_dq && velocity(i) || settings.sc_mask_fingers && finger(i);
+        let masked = |i: usize| settings.sc_mask_dq && velocity(i) || settings.sc_fingers == FingerCloning::None && finger(i);
         let weights: [f32; BASE_DIM] = std::array::from_fn(|i| if masked(i) { 0.0 } else { 1.0 / (std[i] * std[i]) });
         let knee = if settings.sc_knee > 0.0 { settings.sc_knee as f32 } else { f32::INFINITY };
         Choices {
             weights,
             knees: weights.map(|weight| if weight > 0.0 { knee / weight.sqrt() } else { f32::INFINITY }),
-            taught: if settings.sc_mask_fingers { ARM_JOINTS } else { JOINTS },
+            taught: (0..corpus.rows()).flat_map(|r| taught_fingers(settings.sc_fingers, corpus, r)).collect(),
             objective: settings.loss,
             pairs: settings.sc_pairs,
             rho: settings.rho,
@@ -164,10 +182,9 @@ pub fn state_cloning(
     work.rollouts.iter_mut().for_each(|rollout| rollout.provide(policy, dynamics, most_rows, longest));
     let (active, sorted) = (work.active, &work.sorted);
     work.rollouts[..active].par_iter_mut().enumerate().for_each(|(i, rollout)| {
-        rollout.deal(share(sorted, active, i));
-        rollout.run(policy, dynamics, batch, choices);
+        rollout.run(share(sorted, active, i), policy, dynamics, batch, choices);
     });
-    work.collect(policy.net.params().len(), batch.rows.len())
+    work.collect(policy, batch.rows.len())
 }
 
 /// Shard `i` of `count`: as much work as the others have. Long segments stay together, so that few panels are half empty.
@@ -186,16 +203,17 @@ fn share(sorted: &[Segment], count: usize, i: usize) -> &[Segment] {
 }
 
 impl Workspace {
-    fn collect(&mut self, params: usize, rows: usize) -> f64 {
-        self.gradient.resize(params, 0.0);
-        self.gradient.fill(0.0);
+    fn collect(&mut self, policy: &Policy, rows: usize) -> f64 {
+        self.gradient.resize(policy.net.params().len(), 0.0);
+        policy
+            .net
+            .finish_gradient(self.rollouts[..self.active].iter_mut().map(|rollout| &mut rollout.policy), &mut self.gradient);
         self.d_first.clear();
         self.d_first.resize(rows * JOINTS, 0.0);
         self.d_log_std = [0.0; JOINTS];
         let mut l_sc = 0.0;
         for rollout in &self.rollouts[..self.active] {
             l_sc += rollout.loss;
-            shards::add_scaled(&mut self.gradient, &rollout.gradient, 1.0);
             shards::add_scaled(&mut self.d_log_std, &rollout.d_log_std, 1.0);
             rollout.scatter_first(&mut self.d_first);
         }
@@ -206,7 +224,9 @@ impl Workspace {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::demo::Demo;
     use crate::seed::stream;
+    use crate::tasks::Task;
 
     fn segments(rho: f64, pairs: Pairs) -> Vec<Segment> {
         let mut out = Vec::new();
@@ -224,6 +244,26 @@ mod tests {
             assert!((1..count).all(|i| work(i).abs_diff(work(0)) < 40));
         }
         assert!(share(&[], 2, 0).is_empty() && share(&[], 2, 1).is_empty());
+    }
+
+    #[test]
+    fn l_sc_teaches_fingers_that_follow_their_commands() {
+        let (task, finger, command) = (Task::PickUp, ARM_JOINTS + 1, 0.4);
+        let moves = [0.9, 0.6, 0.3, 0.0, -1.0, 1.6]; // shares of the commanded motion
+        let mut states = vec![vec![0.0; task.state_dim()]];
+        for share in moves {
+            let mut next = states[states.len() - 1].clone();
+            next[finger] += share * DT_S * command;
+            states.push(next);
+        }
+        let actions = [[0.0; ARM_JOINTS + 1].as_slice(), &[command, 0.0]].concat().repeat(moves.len());
+        let demo = Demo::new(task, states.concat(), actions.clone(), actions).expect("lengths match");
+        let corpus = Corpus::new(&[demo], "training").expect("a demo");
+        let taught = |sc_fingers| Choices::new(&TrainSettings { sc_fingers, ..Default::default() }, &corpus).taught;
+        let of_finger: Vec<f32> = taught(FingerCloning::Following).into_iter().skip(1).step_by(FINGERS).collect();
+        assert_eq!(of_finger, [1.0, 1.0, 0.0, 0.0, 0.0, 0.0]);
+        assert_eq!(taught(FingerCloning::All), [1.0; 6 * FINGERS]);
+        assert_eq!(taught(FingerCloning::None), [0.0; 6 * FINGERS]);
     }
 
     #[test]

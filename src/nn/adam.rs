@@ -50,9 +50,16 @@ impl Adam {
     }
 }
 
-/// Euclidean norm, summed in f64.
+/// Euclidean norm, summed in f64: several sums side by side, which need not wait for each other.
 pub fn global_norm(gradient: &[f32]) -> f64 {
-    gradient.iter().map(|g| f64::from(*g).powi(2)).sum::<f64>().sqrt()
+    const SUMS: usize = 8;
+    let (chunks, rest) = gradient.as_chunks::<SUMS>();
+    let mut sums = [0.0f64; SUMS];
+    for chunk in chunks {
+        sums.iter_mut().zip(chunk).for_each(|(sum, g)| *sum += f64::from(*g).powi(2));
+    }
+    sums.iter_mut().zip(rest).for_each(|(sum, g)| *sum += f64::from(*g).powi(2));
+    sums.iter().sum::<f64>().sqrt()
 }
 
 /// Scales the gradient down to norm `limit` if it is longer (0 = leave it) and returns the norm it had.

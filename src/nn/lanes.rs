@@ -184,6 +184,18 @@ impl Panels {
         values.iter_mut().zip(panel).for_each(|(v, slot)| *v = slot.0[lane]);
     }
 
+    /// Reads whole rows, the first ones, one after another.
+    pub fn read_rows(&self, values: &mut [f32]) {
+        for (p, rows) in values.chunks_mut(LANES * self.width).enumerate() {
+            let mut each = rows.chunks_exact_mut(self.width);
+            if each.len() == LANES {
+                kernel::separate(std::array::from_fn(|_| each.next().expect("eight rows")), self.panel(p));
+            } else {
+                each.enumerate().for_each(|(lane, row)| self.read_row(p * LANES + lane, row));
+            }
+        }
+    }
+
     /// Writes the first entries of the rows from panel `panel` on: `count` rows of one length; the lanes of the last panel that none of
     /// them fills are set to 0.
     pub fn write_rows<'a>(&mut self, panel: usize, count: usize, row: impl Fn(usize) -> &'a [f32]) {

@@ -220,14 +220,20 @@ impl Mlp {
         }
     }
 
-    /// Writes the sum into `gradient`, laid out as the parameters.
+    /// Writes the sum of all these workspaces' sums into `gradient`, laid out as the parameters. That of the first workspace comes to
+    /// hold it too.
     ///
     /// # Panics
     /// When `gradient` is shorter than the parameters.
-    pub fn finish_gradient(&self, pass: &Pass, gradient: &mut [f32]) {
+    pub fn finish_gradient<'a>(&self, passes: impl IntoIterator<Item = &'a mut Pass>, gradient: &mut [f32]) {
+        let mut passes = passes.into_iter();
+        let Some(total) = passes.next() else {
+            return gradient.fill(0.0);
+        };
+        passes.for_each(|pass| total.sums.absorb(&pass.sums));
         for layer in 0..self.layers() {
             let (weights, biases) = self.layer_ranges(layer);
-            pass.sums.write(layer, &mut gradient[weights.start..biases.end], self.widths[layer + 1]);
+            total.sums.write(layer, &mut gradient[weights.start..biases.end], self.widths[layer + 1]);
         }
     }
 }

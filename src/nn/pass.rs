@@ -97,6 +97,19 @@ impl GradientSums {
         product(&mut self.layers[layer], outputs, of);
     }
 
+    /// Adds the sums of another part of the samples.
+    pub fn absorb(&mut self, other: &GradientSums) {
+        let fresh = self.fresh.iter_mut().zip(&other.fresh);
+        for ((sums, others), (fresh, other_fresh)) in self.layers.iter_mut().zip(&other.layers).zip(fresh) {
+            match (*fresh, *other_fresh) {
+                (_, true) => {}
+                (true, false) => sums.copy_from_slice(others),
+                (false, false) => sums.iter_mut().zip(others).for_each(|(sum, other)| *sum += *other),
+            }
+            *fresh &= *other_fresh;
+        }
+    }
+
     /// Writes a layer's sums into its part of the gradient: weights inputs x outputs, then biases.
     pub fn write(&self, layer: usize, gradient: &mut [f32], outputs: usize) {
         if self.fresh[layer] {

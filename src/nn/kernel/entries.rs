@@ -63,7 +63,7 @@ pub unsafe fn transpose<T: Vector>(to: &mut [Lanes], from: &[Lanes], entries: us
             // SAFETY: all are borrowed; the rest is the caller's.
             unsafe {
                 let turned = T::transposed(std::array::from_fn(|k| T::load(&square[k])));
-                to.iter_mut().zip(turned).for_each(|(to, v)| v.store(to));
+                to.iter_mut().zip(&turned).for_each(|(to, v)| v.store(to));
             }
         }
     }
@@ -82,7 +82,7 @@ pub unsafe fn interleave<T: Vector>(panel: &mut [Lanes], rows: [&[f32]; LANES]) 
         // SAFETY: entries from..from + 8 lie in every row, as from <= last; the rest is the caller's.
         unsafe {
             let turned = T::transposed(std::array::from_fn(|r| T::load_row(rows[r].as_ptr().add(from))));
-            panel[from..].iter_mut().zip(turned).for_each(|(to, v)| v.store(to));
+            panel[from..].iter_mut().zip(&turned).for_each(|(to, v)| v.store(to));
         }
     }
 }
@@ -92,14 +92,17 @@ pub unsafe fn interleave<T: Vector>(panel: &mut [Lanes], rows: [&[f32]; LANES]) 
 #[inline(always)]
 pub unsafe fn separate<T: Vector>(rows: [&mut [f32]; LANES], panel: &[Lanes]) {
     let Some(last) = panel.len().checked_sub(LANES) else {
-        return rows.into_iter().enumerate().for_each(|(r, row)| row.iter_mut().zip(panel).for_each(|(v, entry)| *v = entry.0[r]));
+        return rows
+            .into_iter()
+            .enumerate()
+            .for_each(|(r, row)| row.iter_mut().zip(panel).for_each(|(v, entry)| *v = entry.0[r]));
     };
     let rows = rows.map(|row| row.as_mut_ptr());
     for from in (0..last).step_by(LANES).chain([last]) {
         // SAFETY: as above.
         unsafe {
             let turned = T::transposed(std::array::from_fn(|k| T::load(&panel[from + k])));
-            rows.iter().zip(turned).for_each(|(row, v)| v.store_row(row.add(from)));
+            rows.iter().zip(&turned).for_each(|(row, v)| v.store_row(row.add(from)));
         }
     }
 }

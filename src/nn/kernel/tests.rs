@@ -155,7 +155,11 @@ fn interleaving_puts_rows_into_lanes_and_separating_takes_them_out() {
             let mut back = rows.clone().map(|row| vec![9.0; row.len()]);
             separate_on(path, back.each_mut().map(Vec::as_mut_slice), &panel);
             for (row, back) in rows.iter().zip(&back) {
-                assert_eq!((&row[..entries], &back[entries..]), (&back[..entries], &[9.0, 9.0][..]), "{path:?}, {entries} entries");
+                assert_eq!(
+                    (&row[..entries], &back[entries..]),
+                    (&back[..entries], &[9.0, 9.0][..]),
+                    "{path:?}, {entries} entries"
+                );
             }
         }
     }

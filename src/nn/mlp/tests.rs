@@ -32,14 +32,14 @@ fn gradients_of_every_layer_equal_finite_differences() {
         mlp.begin_gradient(&mut pass);
         mlp.add_gradient(&mut pass, 0..1);
         mlp.add_gradient(&mut pass, 1..panels);
-        mlp.finish_gradient(&pass, &mut gradient);
+        mlp.finish_gradient([&mut pass], &mut gradient);
         mlp.begin_gradient(&mut pass);
         mlp.learn(&mut pass, 0..panels);
         let mut at_once = vec![0.0; mlp.params().len()];
-        mlp.finish_gradient(&pass, &mut at_once);
+        mlp.finish_gradient([&mut pass], &mut at_once);
         mlp.begin_gradient(&mut pass);
         mlp.add_gradient(&mut pass, 0..panels);
-        mlp.finish_gradient(&pass, &mut gradient);
+        mlp.finish_gradient([&mut pass], &mut gradient);
         assert_eq!(at_once, gradient);
         let d_input = std::mem::take(&mut pass.d_input);
         pass.reserve(&mlp, panels);
