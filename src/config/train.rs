@@ -47,7 +47,7 @@ pub struct TrainSettings {
     pub sc_scale: StateScale,
     /// Whether L_SC leaves out joint velocities. They repeat the action: with them, coming back to the path costs as much as leaving it.
     pub sc_mask_dq: bool,
-    /// Which commands of the fingers L_SC teaches; L_BC teaches all.
+    /// Which commands of the fingers L_SC teaches; L_BC teaches all. Where L_BC has no weight (alpha = 1, `sc`), `"following"` means all.
     pub sc_fingers: FingerCloning,
     /// Error, in units of `sc_scale`, beyond which L_SC grows as a line instead of a parabola; 0 = never. Without it the few large
     /// errors after a push outweigh the millimetres that decide a release.

@@ -7,7 +7,7 @@ use super::policy::Policy;
 use super::run::{Hooks, Run};
 use super::selection::Selection;
 use super::{Dynamics, pretrain_dynamics::Batches};
-use crate::config::{Alpha, TrainSettings};
+use crate::config::{Alpha, FingerCloning, TrainSettings};
 use crate::demo::Demo;
 use crate::error::{Error, Result};
 use crate::nn::cosine;
@@ -70,6 +70,7 @@ pub fn train(
     if alpha != Alpha::Fixed(0.0) && dynamics.is_none() {
         return Err(Error::Usage("state cloning needs a dynamics network: run `hilt pretrain` first, or train with bc".into()));
     }
+    let settings = &with_a_teacher_for_the_fingers(settings, alpha);
     let mut run = Run::new(Learner::new(train, validation, dynamics, settings, seed)?, settings, hooks)?;
     let warm = method != Method::Sc && !run.reached(HIL);
     let warmed = if warm { warm_start(&mut run, settings) } else { Ok(()) };
@@ -80,6 +81,12 @@ pub fn train(
             Err(why)
         }
     }
+}
+
+/// Commands of fingers that do not follow are left to L_BC; where L_BC has no weight, they stay with L_SC.
+fn with_a_teacher_for_the_fingers(settings: &TrainSettings, alpha: Alpha) -> TrainSettings {
+    let left_to_bc = settings.sc_fingers == FingerCloning::Following && alpha == Alpha::Fixed(1.0);
+    TrainSettings { sc_fingers: if left_to_bc { FingerCloning::All } else { settings.sc_fingers }, ..settings.clone() }
 }
 
 /// Behavior cloning on pairs shuffled across demos: d_conv passes .9 within a few hundred updates of Algorithm 1, which starves L_BC
@@ -228,6 +235,16 @@ mod tests {
         assert_eq!(mixing.weight(0.0), 0.0);
         assert!((mixing.weight(1.0) - 0.1).abs() < 1e-12);
         assert_eq!(Mixing::new(Alpha::Fixed(0.3), &settings, 10).weight(1.0), 0.3);
+    }
+
+    #[test]
+    fn without_l_bc_no_finger_is_left_alone() {
+        let of = |sc_fingers, alpha| {
+            with_a_teacher_for_the_fingers(&TrainSettings { sc_fingers, ..Default::default() }, alpha).sc_fingers
+        };
+        assert_eq!(of(FingerCloning::Following, Alpha::Fixed(1.0)), FingerCloning::All);
+        assert_eq!(of(FingerCloning::Following, Alpha::Adaptive), FingerCloning::Following);
+        assert_eq!(of(FingerCloning::None, Alpha::Fixed(1.0)), FingerCloning::None);
     }
 
     #[test]
