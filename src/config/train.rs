@@ -20,8 +20,8 @@ pub struct TrainSettings {
     pub hidden_units: usize,
     /// What the policy sees of the state.
     pub features: FeatureSet,
-    /// Whether joint velocities are hidden from the policy. They can be worth a lot with few demos, and they invite copying the last
-    /// action: some policies then never close the hand.
+    /// Whether joint velocities are hidden from the policy. They are worth a lot with few demos, but tell the last action, which a
+    /// policy may learn to copy.
     pub mask_dq: bool,
     /// Units and normalisation of L_BC and L_SC.
     pub loss: Objective,

