@@ -76,7 +76,9 @@ fn interrupted_twice_training_ends_with_the_same_bytes() {
 #[test]
 fn a_killed_training_goes_on_from_the_last_checkpoint() {
     let (whole, run) = (Run::finished(), Run::finished());
-    let select = [&LONG[..], &["train.select_episodes=2", "train.select_candidates=3"]].concat();
+    // several seconds on a fast machine, so that a checkpoint a second is written before the end
+    let longer = ["train.warm_start_updates=40000", "train.select_episodes=2", "train.select_candidates=3"];
+    let select = [&LONG[..], &longer].concat();
     done(training(&whole, &select, &[]));
     let words = training(&run, &select, &["--checkpoint-every", "1"]);
     let output = stopped(words, "KILL", || run.at(CHECKPOINT).exists());
