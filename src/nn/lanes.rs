@@ -186,14 +186,8 @@ impl Panels {
 
     /// Reads whole rows, the first ones, one after another.
     pub fn read_rows(&self, values: &mut [f32]) {
-        for (p, rows) in values.chunks_mut(LANES * self.width).enumerate() {
-            let mut each = rows.chunks_exact_mut(self.width);
-            if each.len() == LANES {
-                kernel::separate(std::array::from_fn(|_| each.next().expect("eight rows")), self.panel(p));
-            } else {
-                each.enumerate().for_each(|(lane, row)| self.read_row(p * LANES + lane, row));
-            }
-        }
+        let panels = values.chunks_mut(LANES * self.width).enumerate();
+        panels.for_each(|(p, rows)| read_panel(self.panel(p), rows));
     }
 
     /// Writes the first entries of the rows from panel `panel` on: `count` rows of one length; the lanes of the last panel that none of
@@ -211,6 +205,16 @@ impl Panels {
         if !r.is_multiple_of(LANES) {
             self.panel_mut(r / LANES).iter_mut().for_each(|slot| slot.0[r % LANES..].fill(0.0));
         }
+    }
+}
+
+/// Reads whole rows of a panel, the first ones, one after another.
+pub fn read_panel(panel: &[Lanes], values: &mut [f32]) {
+    let mut rows = values.chunks_exact_mut(panel.len());
+    if rows.len() == LANES {
+        kernel::separate(std::array::from_fn(|_| rows.next().expect("eight rows")), panel);
+    } else {
+        rows.enumerate().for_each(|(lane, row)| row.iter_mut().zip(panel).for_each(|(v, entry)| *v = entry.0[lane]));
     }
 }
 
@@ -232,6 +236,9 @@ mod tests {
         let mut together = panels.clone();
         together.write_rows(0, 11, |r| &rows[r]);
         assert_eq!(together, panels);
+        let mut all = [[0.0; 3]; 11];
+        panels.read_rows(all.as_flattened_mut());
+        assert_eq!(all.as_slice(), rows);
         let mut row = [0.0; 3];
         panels.read_row(9, &mut row);
         assert_eq!((row, panels.get(9, 1)), ([9.0, 19.0, -1.0], 19.0));

@@ -1,8 +1,8 @@
 //! The workspace of forward and backward.
 
 use super::Mlp;
-use super::kernel::{Coefficients, Finish, Product, Start, product, separate, transpose};
-use super::lanes::{LANES, Lanes, Panels, panels_of};
+use super::kernel::{Coefficients, Finish, Product, Start, product, transpose};
+use super::lanes::{LANES, Lanes, Panels, panels_of, read_panel};
 
 /// Panels that had best go through forward, backward and the gradient before the next do: their activations then wait in a core's second
 /// cache (200 to 400 kB for a network of three times 100), and the sums of the gradient still stay in registers for long.
@@ -115,13 +115,7 @@ impl GradientSums {
         if self.fresh[layer] {
             return gradient.fill(0.0);
         }
-        for (rows, sums) in gradient.chunks_mut(LANES * outputs).zip(self.layers[layer].chunks_exact(outputs)) {
-            let mut each = rows.chunks_exact_mut(outputs);
-            if each.len() == LANES {
-                separate(std::array::from_fn(|_| each.next().expect("eight rows")), sums);
-            } else {
-                each.enumerate().for_each(|(l, row)| row.iter_mut().zip(sums).for_each(|(d, sum)| *d = sum.0[l]));
-            }
-        }
+        let panels = self.layers[layer].chunks_exact(outputs);
+        panels.zip(gradient.chunks_mut(LANES * outputs)).for_each(|(sums, rows)| read_panel(sums, rows));
     }
 }

@@ -35,12 +35,12 @@ fn gradients_of_every_layer_equal_finite_differences() {
         mlp.finish_gradient([&mut pass], &mut gradient);
         mlp.begin_gradient(&mut pass);
         mlp.learn(&mut pass, 0..panels);
-        let mut at_once = vec![0.0; mlp.params().len()];
-        mlp.finish_gradient([&mut pass], &mut at_once);
+        let [mut learned, mut added] = [0.0, 0.0].map(|zero| vec![zero; gradient.len()]);
+        mlp.finish_gradient([&mut pass], &mut learned);
         mlp.begin_gradient(&mut pass);
         mlp.add_gradient(&mut pass, 0..panels);
-        mlp.finish_gradient([&mut pass], &mut gradient);
-        assert_eq!(at_once, gradient);
+        mlp.finish_gradient([&mut pass], &mut added);
+        assert_eq!(learned, added);
         let d_input = std::mem::take(&mut pass.d_input);
         pass.reserve(&mlp, panels);
         mlp.backward_through(&mut pass, 0..1);
