@@ -18,22 +18,22 @@ const SPARE: u64 = 2;
 pub enum Features {
     /// As the settings say.
     Best,
-    /// The same with joint velocities.
-    Dq,
-    /// The state itself, joint velocities included.
+    /// The same without joint velocities.
+    Masked,
+    /// The state itself.
     Raw,
 }
 
 impl Features {
     fn name(self) -> &'static str {
-        ["best", "dq", "raw"][self as usize]
+        ["best", "masked", "raw"][self as usize]
     }
 
     fn sets(self) -> Vec<String> {
         match self {
             Features::Best => Vec::new(),
-            Features::Dq => vec!["train.mask_dq=false".into()],
-            Features::Raw => ["train.features=raw", "train.mask_dq=false"].map(String::from).to_vec(),
+            Features::Masked => vec!["train.mask_dq=true".into()],
+            Features::Raw => vec!["train.features=raw".into()],
         }
     }
 }

@@ -1,7 +1,7 @@
 //! The studies: success rates of many trainings, as commands that can be stopped and started again.
 //!
 //! ```text
-//! cargo bench --bench study -- few-demos     # BC, SC and HIL with 25, 50 and 100 demos: docs/results/few-demos.csv
+//! cargo bench --bench study -- few-demos     # BC, SC and HIL with 10 to 100 demos: docs/results/few-demos.csv
 //! cargo bench --bench study -- off-track     # BC and HIL in scenes that their demos do not show, and with demos that do
 //! cargo bench --bench study -- paper         # preset paper, three tasks
 //! cargo bench --bench study -- gradients --recordings DIR --dynamics FILE   # the network's answer to an action beside the simulator's
@@ -36,10 +36,10 @@ pub struct Args {
     #[arg(long, value_delimiter = ',')]
     seeds: Vec<u64>,
     /// few-demos: numbers of demos
-    #[arg(long, value_delimiter = ',', default_values_t = [25, 50, 100])]
+    #[arg(long, value_delimiter = ',', default_values_t = [10, 25, 50, 100])]
     demos: Vec<u64>,
-    /// few-demos: what the policy sees: best (as the settings say), dq (with joint velocities), raw (the state itself)
-    #[arg(long, value_delimiter = ',', default_values = ["best", "dq", "raw"])]
+    /// few-demos: what the policy sees: best (as the settings say), masked (without joint velocities), raw (the state itself)
+    #[arg(long, value_delimiter = ',', default_values = ["best", "masked", "raw"])]
     features: Vec<few_demos::Features>,
     /// Methods: bc, sc, hil [default: all; off-track: bc and hil; paper: hil]
     #[arg(long, value_delimiter = ',')]

@@ -10,7 +10,7 @@ use hilt::report::chart::{Chart, Panel, Point, Series};
 /// Methods in the order of legends and columns, with their names.
 const METHODS: [(&str, &str); 3] = [("bc", "BC"), ("sc", "SC"), ("hil", "HIL")];
 /// Titles of the panels, by the label `features`.
-const PANELS: [(&str, &str); 3] = [("best", "default inputs"), ("dq", "with joint velocities"), ("raw", "raw state")];
+const PANELS: [(&str, &str); 3] = [("best", "default inputs"), ("masked", "without joint velocities"), ("raw", "raw state")];
 
 /// Successes and episodes of all seeds.
 fn pooled<'a>(rows: impl Iterator<Item = &'a Counted>) -> (u64, u64) {

@@ -20,8 +20,8 @@ pub struct TrainSettings {
     pub hidden_units: usize,
     /// What the policy sees of the state.
     pub features: FeatureSet,
-    /// Whether joint velocities are hidden from the policy. They are worth a lot with few demos, but tell the last action, which a
-    /// policy may learn to copy.
+    /// Whether joint velocities are hidden from the policy. They tell the last action, which a policy may learn to copy; but with few
+    /// demos they are worth more than anything else.
     pub mask_dq: bool,
     /// Units and normalisation of L_BC and L_SC.
     pub loss: Objective,
@@ -97,7 +97,7 @@ impl Default for TrainSettings {
             hidden_layers: 3,
             hidden_units: 100,
             features: FeatureSet::FkNear,
-            mask_dq: true,
+            mask_dq: false,
             loss: Objective::StandardisedMean,
             action: ActionChoice::Mean,
             initial_std: 0.5,
