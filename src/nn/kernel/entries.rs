@@ -50,6 +50,30 @@ pub unsafe fn tanh_all<T: Vector>(y: &mut [Lanes]) {
     }
 }
 
+/// Eight floats from each of eight places turned round: element i of vector r becomes element r of vector i. One by one, as an array of
+/// vectors would be copied through memory.
+///
+/// # Safety
+/// Eight floats lie at each address, and the processor has T's instructions.
+#[inline(always)]
+unsafe fn turn<T: Vector>(to: [*mut f32; LANES], from: [*const f32; LANES]) {
+    // SAFETY: the caller's.
+    unsafe {
+        let [a, b, c, d, e, f, g, h] = from;
+        let (a, b, c, d) = (T::load_row(a), T::load_row(b), T::load_row(c), T::load_row(d));
+        let (e, f, g, h) = (T::load_row(e), T::load_row(f), T::load_row(g), T::load_row(h));
+        let [a, b, c, d, e, f, g, h] = T::transposed([a, b, c, d, e, f, g, h]);
+        a.store_row(to[0]);
+        b.store_row(to[1]);
+        c.store_row(to[2]);
+        d.store_row(to[3]);
+        e.store_row(to[4]);
+        f.store_row(to[5]);
+        g.store_row(to[6]);
+        h.store_row(to[7]);
+    }
+}
+
 #[inline(always)]
 pub unsafe fn transpose<T: Vector>(to: &mut [Lanes], from: &[Lanes], entries: usize) {
     let samples = from.len() / entries * LANES;
@@ -62,8 +86,8 @@ pub unsafe fn transpose<T: Vector>(to: &mut [Lanes], from: &[Lanes], entries: us
             let to = &mut to[p * LANES..(p + 1) * LANES];
             // SAFETY: all are borrowed; the rest is the caller's.
             unsafe {
-                let turned = T::transposed(std::array::from_fn(|k| T::load(&square[k])));
-                to.iter_mut().zip(&turned).for_each(|(to, v)| v.store(to));
+                let to = to.as_mut_ptr();
+                turn::<T>(std::array::from_fn(|k| to.add(k).cast()), std::array::from_fn(|k| (&raw const square[k]).cast()));
             }
         }
     }
@@ -81,8 +105,8 @@ pub unsafe fn interleave<T: Vector>(panel: &mut [Lanes], rows: [&[f32]; LANES]) 
     for from in (0..last).step_by(LANES).chain([last]) {
         // SAFETY: entries from..from + 8 lie in every row, as from <= last; the rest is the caller's.
         unsafe {
-            let turned = T::transposed(std::array::from_fn(|r| T::load_row(rows[r].as_ptr().add(from))));
-            panel[from..].iter_mut().zip(&turned).for_each(|(to, v)| v.store(to));
+            let to = panel[from..from + LANES].as_mut_ptr();
+            turn::<T>(std::array::from_fn(|k| to.add(k).cast()), rows.map(|row| row.as_ptr().add(from)));
         }
     }
 }
@@ -101,8 +125,8 @@ pub unsafe fn separate<T: Vector>(rows: [&mut [f32]; LANES], panel: &[Lanes]) {
     for from in (0..last).step_by(LANES).chain([last]) {
         // SAFETY: as above.
         unsafe {
-            let turned = T::transposed(std::array::from_fn(|k| T::load(&panel[from + k])));
-            rows.iter().zip(&turned).for_each(|(row, v)| v.store_row(row.add(from)));
+            let square = panel[from..from + LANES].as_ptr();
+            turn::<T>(rows.map(|row| row.add(from)), std::array::from_fn(|k| square.add(k).cast()));
         }
     }
 }

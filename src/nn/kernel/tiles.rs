@@ -195,29 +195,42 @@ unsafe fn step<T: Vector, const S: usize, const P: usize, const F: usize>(
     }
 }
 
-#[inline(always)]
-unsafe fn finish<T: Vector, const P: usize, const F: usize>(tile: &Tile, sums: [[T; P]; F]) {
-    // SAFETY: the caller's.
-    unsafe {
-        for (f, sums) in sums.into_iter().enumerate() {
-            for (p, sum) in sums.into_iter().enumerate() {
-                let at = p * tile.width + f;
-                let to = tile.result.add(at);
-                let sum = match tile.start {
-                    TileStart::Zero => sum,
-                    TileStart::Result => sum.add(T::load(to)),
-                    TileStart::Bias(bias) => sum.add(T::splat(*bias.add(f))),
-                };
-                let value = match tile.finish {
-                    TileFinish::Nothing => sum,
-                    TileFinish::Tanh => tanh(sum),
-                    TileFinish::Relu => sum.positive(),
-                    TileFinish::TanhSlope(y) => tanh_slope(sum, T::load(y.add(at))),
-                    TileFinish::ReluSlope(y) => sum.where_positive(T::load(y.add(at))),
-                };
-                value.store(to);
+/// `$each` for every entry f and panel p of a tile of F entries, written out: in loops the sums would lie in memory.
+macro_rules! each {
+    ($sums:ident, |$f:ident, $p:ident, $sum:ident| $each:expr) => {{
+        const { assert!(F <= 12, "an entry for each number below") }
+        each!($sums, |$f, $p, $sum| $each, 0 1 2 3 4 5 6 7 8 9 10 11)
+    }};
+    ($sums:ident, |$f:ident, $p:ident, $sum:ident| $each:expr, $($entry:literal)*) => {{
+        $(
+            if $entry < F {
+                let $f = $entry;
+                for ($p, $sum) in $sums[$entry].iter_mut().enumerate() {
+                    $each;
+                }
             }
+        )*
+    }};
+}
+
+/// What the sums begin with and what is made of them, asked once a tile: asked once a sum it takes a hundred cycles.
+#[inline(always)]
+unsafe fn finish<T: Vector, const P: usize, const F: usize>(tile: &Tile, mut sums: [[T; P]; F]) {
+    // SAFETY: the caller's; entry f of the tile's panel p lies p * width + f after its first.
+    unsafe {
+        match tile.start {
+            TileStart::Zero => {}
+            TileStart::Result => each!(sums, |f, p, sum| *sum = sum.add(T::load(tile.result.add(p * tile.width + f)))),
+            TileStart::Bias(bias) => each!(sums, |f, _p, sum| *sum = sum.add(T::splat(*bias.add(f)))),
         }
+        match tile.finish {
+            TileFinish::Nothing => {}
+            TileFinish::Tanh => each!(sums, |_f, _p, sum| *sum = tanh(*sum)),
+            TileFinish::Relu => each!(sums, |_f, _p, sum| *sum = sum.positive()),
+            TileFinish::TanhSlope(y) => each!(sums, |f, p, sum| *sum = tanh_slope(*sum, T::load(y.add(p * tile.width + f)))),
+            TileFinish::ReluSlope(y) => each!(sums, |f, p, sum| *sum = sum.where_positive(T::load(y.add(p * tile.width + f)))),
+        }
+        each!(sums, |f, p, sum| sum.store(tile.result.add(p * tile.width + f)));
     }
 }
 
