@@ -71,26 +71,18 @@ impl Vector for __m256 {
     unsafe fn transposed(v: [Self; LANES]) -> [Self; LANES] {
         // SAFETY: as above.
         unsafe {
-            // pairs of rows, then quadruples, then halves; written out, so that nothing leaves the registers
-            let [a, b, c, d, e, f, g, h] = v;
-            let (ab, cd) =
-                ([_mm256_unpacklo_ps(a, b), _mm256_unpackhi_ps(a, b)], [_mm256_unpacklo_ps(c, d), _mm256_unpackhi_ps(c, d)]);
-            let (ef, gh) =
-                ([_mm256_unpacklo_ps(e, f), _mm256_unpackhi_ps(e, f)], [_mm256_unpacklo_ps(g, h), _mm256_unpackhi_ps(g, h)]);
-            let [a, b] = [_mm256_shuffle_ps::<0x44>(ab[0], cd[0]), _mm256_shuffle_ps::<0xEE>(ab[0], cd[0])];
-            let [c, d] = [_mm256_shuffle_ps::<0x44>(ab[1], cd[1]), _mm256_shuffle_ps::<0xEE>(ab[1], cd[1])];
-            let [e, f] = [_mm256_shuffle_ps::<0x44>(ef[0], gh[0]), _mm256_shuffle_ps::<0xEE>(ef[0], gh[0])];
-            let [g, h] = [_mm256_shuffle_ps::<0x44>(ef[1], gh[1]), _mm256_shuffle_ps::<0xEE>(ef[1], gh[1])];
-            [
-                _mm256_permute2f128_ps::<0x20>(a, e),
-                _mm256_permute2f128_ps::<0x20>(b, f),
-                _mm256_permute2f128_ps::<0x20>(c, g),
-                _mm256_permute2f128_ps::<0x20>(d, h),
-                _mm256_permute2f128_ps::<0x31>(a, e),
-                _mm256_permute2f128_ps::<0x31>(b, f),
-                _mm256_permute2f128_ps::<0x31>(c, g),
-                _mm256_permute2f128_ps::<0x31>(d, h),
-            ]
+            // pairs of rows, then quadruples, then halves
+            let pair = |i: usize| [_mm256_unpacklo_ps(v[i], v[i + 1]), _mm256_unpackhi_ps(v[i], v[i + 1])];
+            let pairs = [pair(0), pair(2), pair(4), pair(6)];
+            let quad = |i: usize, k: usize| {
+                let (a, b) = (pairs[i][k], pairs[i + 1][k]);
+                [_mm256_shuffle_ps::<0x44>(a, b), _mm256_shuffle_ps::<0xEE>(a, b)]
+            };
+            let (low, high) = ([quad(0, 0), quad(0, 1)], [quad(2, 0), quad(2, 1)]);
+            std::array::from_fn(|r| {
+                let (low, high) = (low[r % 4 / 2][r % 2], high[r % 4 / 2][r % 2]);
+                if r < 4 { _mm256_permute2f128_ps::<0x20>(low, high) } else { _mm256_permute2f128_ps::<0x31>(low, high) }
+            })
         }
     }
     #[inline(always)]

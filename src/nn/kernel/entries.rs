@@ -50,8 +50,8 @@ pub unsafe fn tanh_all<T: Vector>(y: &mut [Lanes]) {
     }
 }
 
-/// Eight floats from each of eight places turned round: element i of vector r becomes element r of vector i. One by one, as an array of
-/// vectors would be copied through memory.
+/// Eight floats from each of eight places turned round: element i of vector r becomes element r of vector i. The vectors go by value: a
+/// borrowed array of them would be copied through memory.
 ///
 /// # Safety
 /// Eight floats lie at each address, and the processor has T's instructions.
@@ -59,18 +59,8 @@ pub unsafe fn tanh_all<T: Vector>(y: &mut [Lanes]) {
 unsafe fn turn<T: Vector>(to: [*mut f32; LANES], from: [*const f32; LANES]) {
     // SAFETY: the caller's.
     unsafe {
-        let [a, b, c, d, e, f, g, h] = from;
-        let (a, b, c, d) = (T::load_row(a), T::load_row(b), T::load_row(c), T::load_row(d));
-        let (e, f, g, h) = (T::load_row(e), T::load_row(f), T::load_row(g), T::load_row(h));
-        let [a, b, c, d, e, f, g, h] = T::transposed([a, b, c, d, e, f, g, h]);
-        a.store_row(to[0]);
-        b.store_row(to[1]);
-        c.store_row(to[2]);
-        d.store_row(to[3]);
-        e.store_row(to[4]);
-        f.store_row(to[5]);
-        g.store_row(to[6]);
-        h.store_row(to[7]);
+        let turned = T::transposed(from.map(|row| T::load_row(row)));
+        to.into_iter().zip(turned).for_each(|(to, row)| row.store_row(to));
     }
 }
 
@@ -83,11 +73,10 @@ pub unsafe fn transpose<T: Vector>(to: &mut [Lanes], from: &[Lanes], entries: us
         last[..rest.len()].copy_from_slice(rest);
         last[rest.len()] = Lanes::splat(1.0);
         for (square, to) in whole.iter().chain([&last]).zip(to.chunks_exact_mut(samples)) {
-            let to = &mut to[p * LANES..(p + 1) * LANES];
+            let (to, square) = (to[p * LANES..(p + 1) * LANES].as_mut_ptr(), square.as_ptr());
             // SAFETY: all are borrowed; the rest is the caller's.
             unsafe {
-                let to = to.as_mut_ptr();
-                turn::<T>(std::array::from_fn(|k| to.add(k).cast()), std::array::from_fn(|k| (&raw const square[k]).cast()));
+                turn::<T>(std::array::from_fn(|k| to.add(k).cast()), std::array::from_fn(|k| square.add(k).cast()));
             }
         }
     }
