@@ -6,17 +6,12 @@ use crate::error::{Error, Result};
 use crate::learn::Checkpoint;
 use serde_json::{Map, Value};
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
-/// What stands in place of the result's extension.
-const EXTENSION: &str = "checkpoint.safetensors";
+/// What a checkpoint's name has in place of the ending of the weights that it is for.
+pub const ENDING: &str = "checkpoint.safetensors";
 /// Parts of a provenance, in the order in which two are compared.
 const PARTS: [&str; 7] = ["hilt_version", "schema_version", "stage", "task", "seed", "settings", "inputs"];
-
-/// Where the checkpoint of the weights `out` stands.
-pub fn place(out: &Path) -> PathBuf {
-    out.with_extension(EXTENSION)
-}
 
 /// Reads the checkpoint at `path`; `None` when there is none.
 ///

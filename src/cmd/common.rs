@@ -1,5 +1,6 @@
 //! The flags that all stages share: which settings, which seed.
 
+use super::places::Places;
 use crate::config::{Pipeline, Preset, Source, Stage};
 use crate::data::Provenance;
 use crate::error::{Error, Result};
@@ -33,6 +34,11 @@ pub struct SettingsArgs {
 pub type Flag<'a> = (&'a str, Option<String>);
 
 impl SettingsArgs {
+    /// What these settings are read from, where that is a file.
+    pub fn places(&self) -> Places {
+        Places::new().read_all(self.pipeline.as_deref())
+    }
+
     /// The resolved settings; `flags` are dotted keys with the values of the stage's own flags, where given.
     ///
     /// # Errors

@@ -1,4 +1,5 @@
 use super::common::{SettingsArgs, path_or, same_task};
+use super::places::Content;
 use super::{Context, Outcome, dropped};
 use crate::config::Stage;
 use crate::data::{dataset, recording};
@@ -28,7 +29,11 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome> {
     let pipeline = args.settings.resolve(&[])?;
     let dir = path_or(args.recordings.as_deref(), pipeline.task, "recordings");
     let out = path_or(args.out.as_deref(), pipeline.task, "dataset");
-    let files = recordings(&dir)?;
+    args.settings.places().read(&dir).write("--out", &out, Content::Datasets).check(&context.console)?;
+    let files = recording::files(&dir)?;
+    if files.is_empty() {
+        return Err(Error::input(&dir, "holds no recording (episode-00000.mcap, ...); run `hilt simulate` first"));
+    }
 
     let progress = context.console.progress("convert", files.len() as u64, "recordings");
     let read: Vec<dropped::Kept<_>> = files
@@ -57,20 +62,6 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome> {
     let (to, t, v) = (out.display(), train.len(), validation.len());
     context.console.say(&format!("convert: wrote {to}: {t} training and {v} validation episodes"));
     Ok(outcome)
-}
-
-/// The recordings of a directory, by episode.
-fn recordings(dir: &Path) -> Result<Vec<PathBuf>> {
-    let entries = std::fs::read_dir(dir).map_err(|e| Error::io(dir, "read", e))?;
-    let names = entries.map(|entry| entry.map(|e| e.file_name())).collect::<std::io::Result<Vec<_>>>();
-    let names = names.map_err(|e| Error::io(dir, "read", e))?;
-    let mut files: Vec<PathBuf> =
-        names.iter().filter(|n| n.to_str().is_some_and(recording::is_file_name)).map(|n| dir.join(n)).collect();
-    files.sort();
-    if files.is_empty() {
-        return Err(Error::input(dir, "holds no recording (episode-00000.mcap, ...); run `hilt simulate` first"));
-    }
-    Ok(files)
 }
 
 fn load(path: &Path, task: Task, keep_failed: bool) -> Result<dropped::Kept<(Episode, Demo)>> {

@@ -1,4 +1,5 @@
 use super::common::{SettingsArgs, path_or, same_task};
+use super::places::{Content, Places, beside};
 use super::{Context, Outcome, output, train};
 use crate::config::{Pipeline, Stage};
 use crate::data::provenance::Provenance;
@@ -36,7 +37,7 @@ pub struct Args {
     /// Print the summary as JSON instead of a table
     #[arg(long)]
     json: bool,
-    /// Write the summary to this JSON file and the log of the episodes beside it, as .parquet
+    /// Write the summary to this JSON file and the log of the episodes beside it, <name>.episodes.parquet
     #[arg(long, value_name = "FILE.json")]
     out: Option<PathBuf>,
     /// Record every episode as MCAP into this directory
@@ -57,6 +58,8 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome> {
     let stochastic = ("evaluate.stochastic", args.stochastic.then(|| "true".to_string()));
     let pipeline = args.settings.resolve(&[episodes, stochastic])?;
     let path = path_or(args.policy.as_deref(), pipeline.task, "policy.safetensors");
+    let log = args.out.as_deref().map(|out| beside(out, "episodes.parquet"));
+    args.places(&path, log.as_deref()).check(&context.console)?;
     let (subject, inputs) = match path.as_path() {
         planner if planner == Path::new(PLANNER) => (Subject::Planner, vec![]),
         file => (Subject::Policy(Arc::new(read_policy(file, &pipeline)?)), vec![("policy", file)]),
@@ -66,18 +69,14 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome> {
     provenance.settings["evaluate"]["horizon_steps"] = horizon_steps.into();
     provenance.settings["policy"] = if inputs.is_empty() { PLANNER } else { train::KIND }.into();
 
-    if let Some(out) = &args.out {
-        [out, &out.with_extension("parquet")].into_iter().try_for_each(|path| atomic::check_place(path))?;
-    }
     let rollouts = Rollouts::evaluation(&pipeline, args.settings.seed, horizon_steps);
     let trials = match &args.record {
         None => run_all(&rollouts, &subject, context, |_| Ok(()))?,
         Some(dir) => record_all(dir, &rollouts, &subject, context, &provenance)?,
     };
     let summary = Summary::of(pipeline.task, &trials);
-    if let Some(out) = &args.out {
+    if let (Some(out), Some(log)) = (&args.out, log) {
         let value = serde_json::to_value(&summary).map_err(|e| Error::Failed(format!("cannot write JSON: {e}")))?;
-        let log = out.with_extension("parquet");
         let table = table_file::encode(&log, &to_table(pipeline.task, &trials), &provenance)?;
         atomic::write_all(&[(log, table), (out.clone(), json_file::encode(out, &value, &provenance)?)])?;
     }
@@ -87,6 +86,20 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome> {
         output::print(&words(&summary, &trials))?
     }
     Ok(Outcome::Done)
+}
+
+impl Args {
+    fn places(&self, policy: &Path, log: Option<&Path>) -> Places {
+        let mut places = self.settings.places().read_all(Some(policy).filter(|path| *path != Path::new(PLANNER)));
+        if let (Some(out), Some(log)) = (&self.out, log) {
+            places = places.write("--out", out, Content::Summary("evaluate"));
+            places = places.write("the log of the episodes", log, Content::Table("evaluate"));
+        }
+        match &self.record {
+            Some(dir) => places.write("--record", dir, Content::Recordings("evaluate")),
+            None => places,
+        }
+    }
 }
 
 fn read_policy(path: &Path, pipeline: &Pipeline) -> Result<Policy> {
@@ -145,9 +158,10 @@ fn record_all(
     provenance: &Provenance,
 ) -> Result<Vec<Trial>> {
     let (robot, mut trials) = (urdf(), Vec::new());
-    atomic::write_dir(dir, recording::is_file_name, |fresh| {
+    atomic::write_dir(dir, recording::is_file, |fresh| {
         trials = run_all(rollouts, subject, context, |episode| {
-            recording::write(&fresh.join(recording::file_name(episode.index)), episode, &robot, provenance)
+            let file = fresh.join(recording::file_name(episode.index));
+            atomic::write_new(&file, &recording::encode(&file, episode, &robot, provenance)?)
         })?;
         Ok(())
     })?;

@@ -1,7 +1,8 @@
 use super::common::{SettingsArgs, path_or};
+use super::places::Content;
 use super::{Context, Outcome, dropped};
 use crate::config::Stage;
-use crate::data::{atomic, table_file};
+use crate::data::table_file;
 use crate::error::Result;
 use crate::plan::{Planner, to_table};
 use crate::seed;
@@ -29,7 +30,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome> {
     let pipeline = args.settings.resolve(&[("plan.episodes", args.episodes.map(|n| n.to_string()))])?;
     let (task, seed) = (pipeline.task, args.settings.seed);
     let out = path_or(args.out.as_deref(), task, "plans.parquet");
-    atomic::check_place(&out)?;
+    args.settings.places().write("--out", &out, Content::Table("plan")).check(&context.console)?;
     let provenance = args.settings.provenance(Stage::Plan, &pipeline, &[])?;
 
     let progress = context.console.progress("plan", pipeline.plan.episodes, "plans");

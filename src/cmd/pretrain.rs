@@ -1,5 +1,6 @@
 use super::common::{SettingsArgs, path_or};
 use super::epochs::Epochs;
+use super::places::{Content, beside};
 use super::{Context, Outcome, output};
 use crate::config::{Pipeline, SimulateSettings, Stage};
 use crate::data::{atomic, dataset, table_file, weights};
@@ -21,7 +22,7 @@ pub struct Args {
     /// Directory with the datasets train and validation [default: runs/<TASK>/dataset]
     #[arg(long, value_name = "DIR")]
     dataset: Option<PathBuf>,
-    /// Weights to write, with their errors (same name, .parquet) and pretraining.parquet, the epochs, beside them [default: runs/<TASK>/dynamics.safetensors]
+    /// Weights to write, with <name>.errors.parquet and <name>.pretraining.parquet, their errors and the epochs, beside them [default: runs/<TASK>/dynamics.safetensors]
     #[arg(long, value_name = "FILE.safetensors")]
     out: Option<PathBuf>,
 }
@@ -30,10 +31,12 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome> {
     let pipeline = args.settings.resolve(&[])?;
     let dir = path_or(args.dataset.as_deref(), pipeline.task, "dataset");
     let out = path_or(args.out.as_deref(), pipeline.task, "dynamics.safetensors");
+    let (errors, metrics) = (beside(&out, "errors.parquet"), beside(&out, "pretraining.parquet"));
+    let places = args.settings.places().read(&dir).write("--out", &out, Content::Weights(KIND, "pretrain"));
+    let places = places.write("the table of errors", &errors, Content::Table("pretrain"));
+    places.write("the table of epochs", &metrics, Content::Table("pretrain")).check(&context.console)?;
     let (mut train, validation) = demos(&dir, &pipeline)?;
     let provenance = args.settings.provenance(Stage::Pretrain, &pipeline, &[("dataset", &dir)])?;
-    let (errors, metrics) = (out.with_extension("parquet"), out.with_file_name("pretraining.parquet"));
-    [&errors, &metrics, &out].into_iter().try_for_each(|path| atomic::check_place(path))?;
 
     let seed = args.settings.seed;
     train.extend(reexecute(&train, &pipeline, seed, context)?);

@@ -1,4 +1,5 @@
 use super::common::{SettingsArgs, path_or, same_task};
+use super::places::Content;
 use super::{Context, Outcome};
 use crate::config::Stage;
 use crate::data::{atomic, recording, table_file};
@@ -31,6 +32,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome> {
     let pipeline = args.settings.resolve(&[])?;
     let path = path_or(args.plans.as_deref(), pipeline.task, "plans.parquet");
     let out = path_or(args.out.as_deref(), pipeline.task, "recordings");
+    args.settings.places().read(&path).write("--out", &out, Content::Recordings("simulate")).check(&context.console)?;
     let (table, made) = table_file::read(&path)?;
     same_task(&path, made.task, pipeline.task)?;
     let mut plans = from_table(&table).map_err(|why| Error::input(&path, why))?;
@@ -52,11 +54,12 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome> {
         let episode = run_episode(plan.index, &plan.scene, &mut follower, &mut disturbance, pipeline.simulate.max_steps);
         solved.fetch_add(u64::from(episode.success), Ordering::Relaxed);
         steps.fetch_add(episode.steps.len() as u64, Ordering::Relaxed);
-        recording::write(&dir.join(recording::file_name(plan.index)), &episode, &robot, &provenance)?;
+        let file = dir.join(recording::file_name(plan.index));
+        atomic::write_new(&file, &recording::encode(&file, &episode, &robot, &provenance)?)?;
         progress.step();
         Ok(())
     };
-    atomic::write_dir(&out, recording::is_file_name, |dir| plans.par_iter().try_for_each(|plan| record(plan, dir)))?;
+    atomic::write_dir(&out, recording::is_file, |dir| plans.par_iter().try_for_each(|plan| record(plan, dir)))?;
     progress.finish(&format!(", {} control steps, {} solved", steps.into_inner(), solved.into_inner()));
     context.console.say(&format!("simulate: wrote {}", out.display()));
     Ok(Outcome::Done)

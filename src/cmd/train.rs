@@ -1,6 +1,7 @@
 use super::checkpoint::{self, Keeper};
 use super::common::{SettingsArgs, path_or, same_task};
 use super::epochs::Epochs;
+use super::places::{Content, beside};
 use super::{Console, Context, Outcome, pretrain};
 use crate::config::{Pipeline, Stage};
 use crate::data::{atomic, table_file, weights};
@@ -42,10 +43,10 @@ pub struct Args {
     /// Weights to write [default: runs/<TASK>/policy.safetensors]
     #[arg(long, value_name = "FILE.safetensors")]
     out: Option<PathBuf>,
-    /// Metrics per epoch to write [default: training.parquet beside the weights]
+    /// Metrics per epoch to write [default: beside the weights, their name with .training.parquet]
     #[arg(long, value_name = "FILE.parquet")]
     metrics: Option<PathBuf>,
-    /// Continue an interrupted run of the same settings from its checkpoint, <OUT>.checkpoint.safetensors; the log goes on too
+    /// Continue an interrupted run of the same settings from its checkpoint beside the weights, <name>.checkpoint.safetensors; the log goes on too
     #[arg(long)]
     pub resume: bool,
     /// Time between two checkpoints; 0 = only when training is interrupted
@@ -59,15 +60,17 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome> {
     let dir = path_or(args.dataset.as_deref(), pipeline.task, "dataset");
     let model = path_or(args.dynamics.as_deref(), pipeline.task, "dynamics.safetensors");
     let out = path_or(args.out.as_deref(), pipeline.task, "policy.safetensors");
-    let metrics = args.metrics.clone().unwrap_or_else(|| out.with_file_name("training.parquet"));
-    let (demos, validation) = pretrain::demos(&dir, &pipeline)?;
+    let metrics = args.metrics.clone().unwrap_or_else(|| beside(&out, "training.parquet"));
     let needs_model = args.method != Method::Bc || args.dynamics.is_some();
+    let kept = beside(&out, checkpoint::ENDING);
+    let places = args.settings.places().read(&dir).read_all(needs_model.then_some(model.as_path()));
+    let places = places.write("--out", &out, Content::Weights(KIND, "train")).write("--metrics", &metrics, Content::Table("train"));
+    places.write("the checkpoint", &kept, Content::Weights(weights::CHECKPOINT, "train")).check(&context.console)?;
+    let (demos, validation) = pretrain::demos(&dir, &pipeline)?;
     let dynamics = needs_model.then(|| read_dynamics(&model, pipeline.task)).transpose()?;
     let all = [("dataset", dir.as_path()), ("dynamics", model.as_path())];
     let inputs = if needs_model { &all[..] } else { &all[..1] };
     let mut provenance = args.settings.provenance(Stage::Train, &pipeline, inputs)?;
-    let kept = checkpoint::place(&out);
-    [&metrics, &out, &kept].into_iter().try_for_each(|path| atomic::check_place(path))?;
     provenance.settings["method"] = format!("{:?}", args.method).to_lowercase().into();
 
     let (console, seed) = (&context.console, args.settings.seed);

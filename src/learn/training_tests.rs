@@ -175,7 +175,7 @@ fn what_cannot_work_is_refused_in_words() {
     let diverging = TrainSettings { warm_start_learning_rate: 1e30, clip_norm: 0.0, ..quick() };
     let message = refused(Method::Bc, &diverging, None).to_string();
     assert!(message.contains("L_BC"), "{message}");
-    go.raise();
+    go.raise(2);
     let (some, held_out) = (demos(Task::Stack, 2, 9, 0), demos(Task::Stack, 1, 9, 9));
     let error = train(Method::Bc, &some, &held_out, None, &quick(), 0, Hooks::new(&go)).expect_err("interrupted");
     assert!(matches!(error, Error::Interrupted));

@@ -69,7 +69,7 @@ impl<'a> DatasetEpisode<'a> {
 /// holds something else; [`Error::Io`] when the system refuses.
 pub fn write(root: &Path, task: Task, episodes: &[DatasetEpisode], provenance: &Provenance) -> Result<()> {
     let content = Content { task, provenance, file_bytes: DATA_FILE_BYTES, interrupt: &Interrupt::default() };
-    atomic::write_dir(root, |name| matches!(name, "meta" | "data"), |dir| content.fill(dir, episodes))
+    atomic::write_dir(root, meta::is_file, |dir| content.fill(dir, episodes))
 }
 
 /// Writes training and validation datasets as `parent/train` and `parent/validation`, both or none. Without validation episodes
@@ -88,7 +88,7 @@ pub fn write_split(
     let content = Content { task, provenance, file_bytes: DATA_FILE_BYTES, interrupt };
     atomic::write_dir(
         parent,
-        |name| matches!(name, TRAIN | VALIDATION),
+        is_file,
         |dir| {
             for (name, episodes) in [(TRAIN, train), (VALIDATION, validation)] {
                 if name == TRAIN || !episodes.is_empty() {
@@ -98,6 +98,11 @@ pub fn write_split(
             Ok(())
         },
     )
+}
+
+/// Whether a path below the two datasets is one of theirs.
+pub fn is_file(path: &Path) -> bool {
+    [TRAIN, VALIDATION].iter().any(|name| path.strip_prefix(name).is_ok_and(meta::is_file))
 }
 
 /// What the datasets of one call share.
