@@ -121,11 +121,11 @@ fn missing_and_foreign_files_end_with_one_and_leave_nothing() {
     for file in [&missing, &noise] {
         says(&["simulate", "--task", "pick-up", "--plans", file, "--out", &out], 1, &[file]);
         says(&["convert", "--task", "pick-up", "--recordings", file, "--out", &out], 1, &[file]);
-        says(&["pretrain", "--task", "pick-up", "--dataset", file, "--out", &out], 1, &[file]);
-        says(&["train", "--task", "pick-up", "--dataset", file, "--out", &out], 1, &[file]);
-        says(&["evaluate", "--task", "pick-up", "--policy", file, "--out", &out], 1, &[file]);
+        says(&["pretrain", "--task", "pick-up", "--dataset", file, "--out", &at("out.safetensors")], 1, &[file]);
+        says(&["train", "--task", "pick-up", "--dataset", file, "--out", &at("out.safetensors")], 1, &[file]);
+        says(&["evaluate", "--task", "pick-up", "--policy", file, "--out", &at("out.json")], 1, &[file]);
         says(&["inspect", file], 1, &[file]);
-        says(&["render", file, "--png", "--out", &out], 1, &[file]);
+        says(&["render", file, "--png", "--out", &at("out.png")], 1, &[file]);
     }
     says(&["settings", "--pipeline", &missing], 1, &[&missing, "cannot read"]);
     assert_eq!(fs::read_dir(dir.path()).expect("readable").count(), 1, "something was left behind");

@@ -1,12 +1,13 @@
 use super::common::{SettingsArgs, path_or, same_task};
 use super::places::Content;
-use super::{Context, Outcome, dropped};
+use super::{Console, Context, Outcome, dropped};
 use crate::config::Stage;
 use crate::data::{dataset, recording};
 use crate::demo::{Demo, Episode};
 use crate::error::{Error, Result};
 use crate::tasks::Task;
 use rayon::prelude::*;
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 /// Turn recordings into two LeRobot datasets, train and validation. Failed episodes are dropped, counted and named.
@@ -25,6 +26,15 @@ pub struct Args {
 /// For when no episode succeeded.
 const ADVICE: &str = "record again with less noise (simulate.noise_variance), or keep them with convert.keep_failed=true";
 
+/// A recording that was read.
+struct Loaded {
+    /// Its number by its file's name: unique also where the recordings of several runs were put together.
+    number: u64,
+    episode: Episode,
+    demo: Demo,
+    seed: u64,
+}
+
 pub fn run(args: &Args, context: &Context) -> Result<Outcome> {
     let pipeline = args.settings.resolve(&[])?;
     let dir = path_or(args.recordings.as_deref(), pipeline.task, "recordings");
@@ -36,7 +46,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome> {
     }
 
     let progress = context.console.progress("convert", files.len() as u64, "recordings");
-    let read: Vec<dropped::Kept<_>> = files
+    let read: Vec<Result<_>> = files
         .par_iter()
         .map(|path| {
             context.interrupt.check()?;
@@ -44,9 +54,13 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome> {
             progress.step();
             loaded
         })
-        .collect::<Result<_>>()?;
+        .collect();
+    // One after the other: of several that cannot be used the first by name is told, whatever the threads.
+    let read = read.into_iter().collect::<Result<Vec<dropped::Kept<_>>>>()?;
     progress.finish("");
     let (mut kept, outcome) = dropped::keep("convert", read, ADVICE, &context.console)?;
+    refuse_twins(&dir, &kept)?;
+    say_of_runs(&kept, &context.console);
     let wanted = pipeline.convert.demos as usize;
     if kept.len() < wanted {
         context.console.say(&format!("convert: {} demos where {wanted} are wanted; raise plan.episodes for more", kept.len()));
@@ -55,8 +69,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome> {
     }
 
     let (train, validation) = dataset::split(kept.len(), pipeline.convert.train_per_validation, args.settings.seed);
-    let pick =
-        |indices: &[usize]| -> Vec<_> { indices.iter().map(|i| dataset::DatasetEpisode::of(&kept[*i].0, &kept[*i].1)).collect() };
+    let pick = |indices: &[usize]| -> Vec<_> { indices.iter().map(|i| kept[*i].for_dataset()).collect() };
     let provenance = args.settings.provenance(Stage::Convert, &pipeline, &[("recordings", &dir)])?;
     dataset::write_split(&out, pipeline.task, &pick(&train), &pick(&validation), &provenance, &context.interrupt)?;
     let (to, t, v) = (out.display(), train.len(), validation.len());
@@ -64,14 +77,38 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome> {
     Ok(outcome)
 }
 
-fn load(path: &Path, task: Task, keep_failed: bool) -> Result<dropped::Kept<(Episode, Demo)>> {
-    let (episode, _) = recording::read(path)?;
+fn load(path: &Path, task: Task, keep_failed: bool) -> Result<dropped::Kept<Loaded>> {
+    let (episode, made) = recording::read(path)?;
     same_task(path, episode.scene.task, task)?;
+    let number = path.file_name().and_then(|name| recording::number_of(name.to_str()?)).unwrap_or(episode.index);
     match episode.failure {
-        Some(class) if !keep_failed => Ok(Err(format!("episode {}: {}", episode.index, class.name()))),
+        Some(class) if !keep_failed => Ok(Err(format!("episode {number}: {}", class.name()))),
         _ => {
             let demo = episode.to_demo().map_err(|why| Error::input(path, why))?;
-            Ok(Ok((episode, demo)))
+            Ok(Ok(Loaded { number, episode, demo, seed: made.seed }))
         }
+    }
+}
+
+impl Loaded {
+    fn for_dataset(&self) -> dataset::DatasetEpisode<'_> {
+        dataset::DatasetEpisode { source_index: self.number, ..dataset::DatasetEpisode::of(&self.episode, &self.demo) }
+    }
+}
+
+/// The same episode twice would stand in training and validation, or count twice.
+fn refuse_twins(dir: &Path, loaded: &[Loaded]) -> Result<()> {
+    let Some((one, other)) = dataset::first_twins(loaded.iter().map(|l| &l.demo)) else { return Ok(()) };
+    let [one, other] = [one, other].map(|at| recording::file_name(loaded[at].number));
+    let message = format!("is the same episode as {one}, in every number: both could land in training and validation; remove one of them");
+    Err(Error::input(&dir.join(other), message))
+}
+
+/// Says so when the recordings are of several runs.
+fn say_of_runs(loaded: &[Loaded], console: &Console) {
+    let seeds: BTreeSet<u64> = loaded.iter().map(|l| l.seed).collect();
+    if seeds.len() > 1 {
+        let seeds: Vec<String> = seeds.iter().map(u64::to_string).collect();
+        console.say(&format!("convert: the recordings are of several runs, seeds {}; episodes go by their files' numbers", seeds.join(", ")));
     }
 }

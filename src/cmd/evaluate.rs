@@ -1,6 +1,7 @@
 use super::common::{SettingsArgs, path_or, same_task};
 use super::places::{Content, Places, beside};
-use super::{Context, Outcome, output, train};
+use super::differences::{Difference, differences};
+use super::{Console, Context, Outcome, output, train};
 use crate::config::{Pipeline, Stage};
 use crate::data::provenance::Provenance;
 use crate::data::{atomic, json_file, recording, table_file, weights};
@@ -14,6 +15,9 @@ use crate::robot::urdf;
 use crate::scene::Scene;
 use crate::seed;
 use crate::sim::{Controller, Follower};
+use serde::Serialize;
+use serde_json::Value;
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -60,28 +64,34 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome> {
     let path = path_or(args.policy.as_deref(), pipeline.task, "policy.safetensors");
     let log = args.out.as_deref().map(|out| beside(out, "episodes.parquet"));
     args.places(&path, log.as_deref()).check(&context.console)?;
-    let (subject, inputs) = match path.as_path() {
-        planner if planner == Path::new(PLANNER) => (Subject::Planner, vec![]),
-        file => (Subject::Policy(Arc::new(read_policy(file, &pipeline)?)), vec![("policy", file)]),
+    let (subject, inputs, trained) = match path.as_path() {
+        planner if planner == Path::new(PLANNER) => (Subject::Planner, vec![], None),
+        file => {
+            let (policy, made) = read_policy(file, &pipeline)?;
+            (Subject::Policy(Arc::new(policy)), vec![("policy", file)], Some(made.settings))
+        }
     };
     let horizon_steps = subject.horizon_steps(&pipeline);
     let mut provenance = args.settings.provenance(Stage::Evaluate, &pipeline, &inputs)?;
     provenance.settings["evaluate"]["horizon_steps"] = horizon_steps.into();
     provenance.settings["policy"] = if inputs.is_empty() { PLANNER } else { train::KIND }.into();
 
+    let foreign = trained.map(|trained| of_scene(&trained, &provenance.settings)).unwrap_or_default();
+    say_of_scene(&foreign, &context.console);
     let rollouts = Rollouts::evaluation(&pipeline, args.settings.seed, horizon_steps);
     let trials = match &args.record {
         None => run_all(&rollouts, &subject, context, |_| Ok(()))?,
         Some(dir) => record_all(dir, &rollouts, &subject, context, &provenance)?,
     };
     let summary = Summary::of(pipeline.task, &trials);
+    let stated = Stated::new(&summary, &foreign);
     if let (Some(out), Some(log)) = (&args.out, log) {
-        let value = serde_json::to_value(&summary).map_err(|e| Error::Failed(format!("cannot write JSON: {e}")))?;
+        let value = serde_json::to_value(&stated).map_err(|e| Error::Failed(format!("cannot write JSON: {e}")))?;
         let table = table_file::encode(&log, &to_table(pipeline.task, &trials), &provenance)?;
         atomic::write_all(&[(log, table), (out.clone(), json_file::encode(out, &value, &provenance)?)])?;
     }
     if args.json {
-        output::print_json(&summary)?
+        output::print_json(&stated)?
     } else {
         output::print(&words(&summary, &trials))?
     }
@@ -102,10 +112,41 @@ impl Args {
     }
 }
 
-fn read_policy(path: &Path, pipeline: &Pipeline) -> Result<Policy> {
+fn read_policy(path: &Path, pipeline: &Pipeline) -> Result<(Policy, Provenance)> {
     let (tensors, meta, made) = weights::read(path, train::KIND)?;
     same_task(path, made.task, pipeline.task)?;
-    Policy::from_tensors(&tensors, &meta).map_err(|why| Error::input(path, why))
+    Ok((Policy::from_tensors(&tensors, &meta).map_err(|why| Error::input(path, why))?, made))
+}
+
+/// Sections of the settings that make an episode what it is.
+const WORLD: [&str; 2] = ["scene", "simulate"];
+
+/// In what the episodes differ from those that the policy was trained for.
+fn of_scene(trained: &Value, here: &Value) -> Vec<Difference> {
+    WORLD.iter().flat_map(|section| differences(section, &trained[*section], &here[*section])).collect()
+}
+
+fn say_of_scene(foreign: &[Difference], console: &Console) {
+    for Difference { key, theirs, ours } in foreign {
+        console.say(&format!("evaluate: {key} is {ours}, the policy was trained with {theirs}: another scene than it has learned"));
+    }
+}
+
+/// What scripts read.
+#[derive(Serialize)]
+struct Stated<'a> {
+    #[serde(flatten)]
+    summary: &'a Summary,
+    /// Where the scene is another than the policy was trained for: by key, \[trained, here\].
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    differs_from_training: BTreeMap<&'a str, [&'a Value; 2]>,
+}
+
+impl<'a> Stated<'a> {
+    fn new(summary: &'a Summary, foreign: &'a [Difference]) -> Self {
+        let differs_from_training = foreign.iter().map(|d| (d.key.as_str(), [&d.theirs, &d.ours])).collect();
+        Stated { summary, differs_from_training }
+    }
 }
 
 impl Subject {

@@ -4,6 +4,7 @@ mod checkpoint;
 mod common;
 mod console;
 mod convert;
+mod differences;
 mod dropped;
 mod epochs;
 mod evaluate;
@@ -57,7 +58,7 @@ pub struct Context {
     name = "hilt",
     version,
     max_term_width = 100,
-    after_help = "Exit codes: 0 done, 1 failed, 2 wrong usage, 3 done but episodes were dropped, 130 or 143 interrupted.\n\
+    after_help = "Exit codes: 0 done, 1 failed, 2 wrong usage, 3 done but episodes were dropped, 130 interrupted (143 by SIGTERM).\n\
                   Results go to stdout, words and progress to stderr."
 )]
 pub struct Cli {

@@ -2,7 +2,8 @@
 
 use super::Console;
 use crate::data::peek::{Format, Peeked, peek};
-use crate::data::{atomic, dataset, recording};
+use crate::data::atomic::{self, Target};
+use crate::data::{dataset, recording};
 use crate::error::{Error, Result};
 use std::ffi::OsStr;
 use std::fs;
@@ -26,9 +27,15 @@ pub enum Content {
     Recordings(&'static str),
     /// A directory with the two datasets.
     Datasets,
+    /// What the command reads as well, and replaces on purpose.
+    Own,
     /// Words of the process.
     Log,
 }
+
+/// Endings of other formats; what follows another dot belongs to a name (policy-0.1).
+const ENDINGS: [&str; 13] =
+    ["parquet", "safetensors", "json", "png", "gif", "log", "mcap", "toml", "txt", "csv", "pt", "pth", "bin"];
 
 /// Inputs and outputs of one command.
 #[derive(Debug, Default)]
@@ -121,8 +128,8 @@ fn place_of(path: &Path) -> Result<Option<PathBuf>> {
         return Ok(Some(found));
     }
     match atomic::target(path) {
-        Ok(atomic::Target::File(place)) => Ok(Some(place)),
-        Ok(atomic::Target::Stream(_)) => Ok(None),
+        Ok(Target::File(place)) => Ok(Some(place)),
+        Ok(Target::Stream(_)) => Ok(None),
         // Said better where it is opened or written.
         Err(_) => Ok(Some(path.to_path_buf())),
     }
@@ -135,7 +142,7 @@ fn same(one: &Path, other: &Path) -> bool {
 }
 
 fn is_stream(path: &Path) -> bool {
-    matches!(atomic::target(path), Ok(atomic::Target::Stream(_)))
+    matches!(atomic::target(path), Ok(Target::Stream(_)))
 }
 
 /// An output's name ends as its format does, so that other tools know it, and what goes beside it has a name of its own.
@@ -147,13 +154,15 @@ fn check_ending(name: &str, path: &Path, content: Content) -> Result<()> {
         Content::Png => ("png", "a PNG picture"),
         Content::Gif => ("gif", "a GIF animation"),
         Content::Log => ("log", "a log"),
-        Content::Recordings(_) | Content::Datasets => return Ok(()),
+        Content::Recordings(_) | Content::Datasets | Content::Own => return Ok(()),
     };
-    if is_stream(path) || path.is_dir() || path.extension() == Some(OsStr::new(ending)) {
+    if matches!(atomic::target(path)?, Target::Stream(_)) || path.extension() == Some(OsStr::new(ending)) {
         return Ok(());
     }
-    let shown = path.display();
-    Err(Error::Usage(format!("{name} {shown}: {format} is written there, its name must end in .{ending}, for example {shown}.{ending}")))
+    let known = path.extension().and_then(OsStr::to_str).is_some_and(|e| ENDINGS.contains(&e));
+    let better = if known { path.with_extension(ending) } else { PathBuf::from(format!("{}.{ending}", path.display())) };
+    let (shown, better) = (path.display(), better.display());
+    Err(Error::Usage(format!("{name} {shown}: {format} is written there, its name must end in .{ending}: {better}")))
 }
 
 /// What stands in an output's place must be of the same kind, from the same stage.
@@ -164,7 +173,7 @@ fn check_held(name: &str, path: &Path, content: Content) -> Result<()> {
         Content::Summary(stage) => (Format::Json, Some(stage), None),
         Content::Png => (Format::Png, None, None),
         Content::Gif => (Format::Gif, None, None),
-        Content::Log | Content::Datasets => return Ok(()),
+        Content::Log | Content::Datasets | Content::Own => return Ok(()),
         Content::Recordings(stage) => return check_recordings(name, path, stage),
     };
     if is_stream(path) || !path.is_file() {

@@ -92,5 +92,12 @@ pub fn demos(dir: &Path, pipeline: &Pipeline) -> Result<(Vec<Demo>, Vec<Demo>)> 
             ),
         ));
     }
+    if let Some((t, v)) = dataset::first_shared(&train, &validation) {
+        let message = format!(
+            "training episode {t} is validation episode {v}, in every number: what is validated has been learned; run hilt convert again, \
+             over recordings of which none is there twice"
+        );
+        return Err(Error::input(dir, message));
+    }
     Ok((train, validation))
 }

@@ -65,7 +65,8 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome> {
     let kept = beside(&out, checkpoint::ENDING);
     let places = args.settings.places().read(&dir).read_all(needs_model.then_some(model.as_path()));
     let places = places.write("--out", &out, Content::Weights(KIND, "train")).write("--metrics", &metrics, Content::Table("train"));
-    places.write("the checkpoint", &kept, Content::Weights(weights::CHECKPOINT, "train")).check(&context.console)?;
+    let checkpoint = if args.resume { Content::Own } else { Content::Weights(weights::CHECKPOINT, "train") };
+    places.write("the checkpoint", &kept, checkpoint).check(&context.console)?;
     let (demos, validation) = pretrain::demos(&dir, &pipeline)?;
     let dynamics = needs_model.then(|| read_dynamics(&model, pipeline.task)).transpose()?;
     let all = [("dataset", dir.as_path()), ("dynamics", model.as_path())];

@@ -2,6 +2,7 @@
 
 use super::{Pipeline, check};
 use crate::error::{Error, Result};
+use crate::interrupt;
 use crate::tasks::Task;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
@@ -87,6 +88,7 @@ impl Pipeline {
 }
 
 fn read(path: &Path) -> Result<String> {
+    let _waits = interrupt::waiting();
     let bytes = std::fs::read(path).map_err(|e| Error::io(path, "read", e))?;
     String::from_utf8(bytes).map_err(|_| Error::Usage(format!("{} is not a pipeline file: it is not UTF-8 text", path.display())))
 }

@@ -21,9 +21,11 @@ pub use inspect::{inspect, inspect_text};
 pub use provenance::{Provenance, hash_path};
 
 use crate::error::{Error, Result};
+use crate::interrupt;
 use std::path::Path;
 
 /// All bytes of a file.
 fn read_bytes(path: &Path) -> Result<Vec<u8>> {
+    let _waits = interrupt::waiting();
     std::fs::read(path).map_err(|e| Error::io(path, "read", e))
 }

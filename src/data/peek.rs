@@ -1,5 +1,6 @@
 //! What a file is that stands where another is to be written: told from its head and its tail, without reading it whole.
 
+use super::provenance::KEY;
 use super::seal::find_last;
 use serde_json::Value;
 use std::fs::File;
@@ -10,6 +11,16 @@ use std::path::Path;
 const HEAD: u64 = 16;
 /// Where a provenance is looked for: the header of weights, the metadata at the end of tables and recordings. Each is a few kilobytes long.
 const REACH: u64 = 1 << 18;
+
+/// A longer JSON file is no summary; it is not read.
+const LONGEST_JSON: u64 = 1 << 26;
+/// Bytes of the number at the beginning of weights that gives their header's length.
+const LENGTH: u64 = 8;
+/// What a provenance's text has before and behind its stage.
+const VERSION: &[u8] = b"\"schema_version\":";
+const STAGE: &[u8] = b"\"stage\":\"";
+/// The stage comes within so many bytes after the version.
+const NEAR: usize = 64;
 
 /// The format of a file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -53,40 +64,66 @@ pub fn peek(path: &Path) -> Result<Peeked> {
     let mut file = File::open(path)?;
     let size = file.metadata()?.len();
     let head = part(&mut file, 0, HEAD)?;
-    let format = format_of(&head, size);
-    let (text, whole) = match format {
-        Format::Parquet => ending(&mut file, size, b"PAR1")?,
-        Format::Mcap => ending(&mut file, size, mcap::MAGIC)?,
-        Format::Safetensors => (part(&mut file, 0, REACH)?, true),
-        Format::Json => {
-            let text = part(&mut file, 0, size.min(REACH * REACH))?;
-            let whole = serde_json::from_slice::<Value>(&text).is_ok();
-            (text, whole)
-        }
-        _ => (Vec::new(), true),
-    };
-    Ok(Peeked { format, stage: value_of(&text, "stage"), kind: value_of(&text, "kind"), whole })
+    let format = format_of(&head);
+    let plain = Peeked { format, stage: None, kind: None, whole: true };
+    Ok(match format {
+        Format::Parquet => in_tail(&mut file, size, b"PAR1", format)?,
+        Format::Mcap => in_tail(&mut file, size, mcap::MAGIC, format)?,
+        Format::Safetensors => in_header(&mut file, size, &head)?,
+        Format::Json if size <= LONGEST_JSON => in_json(&part(&mut file, 0, size)?),
+        _ => plain,
+    })
 }
 
-fn format_of(head: &[u8], size: u64) -> Format {
-    let header_fits = |length: [u8; 8]| u64::from_le_bytes(length).checked_add(8).is_some_and(|end| end <= size);
+fn format_of(head: &[u8]) -> Format {
     match head {
         [] => Format::Empty,
         [b'P', b'A', b'R', b'1', ..] => Format::Parquet,
         [0x89, b'P', b'N', b'G', ..] => Format::Png,
         [b'G', b'I', b'F', b'8', ..] => Format::Gif,
         [b'{', ..] => Format::Json,
-        [a, b, c, d, e, f, g, h, b'{', ..] if header_fits([*a, *b, *c, *d, *e, *f, *g, *h]) => Format::Safetensors,
+        [_, _, _, _, _, 0, 0, 0, b'{', ..] => Format::Safetensors,
         _ if head.starts_with(mcap::MAGIC) => Format::Mcap,
         _ => Format::Other,
     }
 }
 
-/// The last bytes, and whether the file ends as its format does.
-fn ending(file: &mut File, size: u64, magic: &[u8]) -> Result<(Vec<u8>, bool)> {
+/// Of a table or a recording: the provenance's own text near the end.
+fn in_tail(file: &mut File, size: u64, magic: &[u8], format: Format) -> Result<Peeked> {
     let tail = part(file, size.saturating_sub(REACH), REACH)?;
-    let whole = tail.ends_with(magic);
-    Ok((tail, whole))
+    let stage = find_last(&tail, VERSION).and_then(|at| {
+        let rest = &tail[at + VERSION.len()..];
+        let rest = &rest[find_first(&rest[..rest.len().min(NEAR)], STAGE)? + STAGE.len()..];
+        let word: String = rest.iter().take_while(|b| b.is_ascii_lowercase()).map(|b| char::from(*b)).collect();
+        Some(word)
+    });
+    Ok(Peeked { format, stage, kind: None, whole: tail.ends_with(magic) })
+}
+
+/// Of weights: the metadata in the header.
+fn in_header(file: &mut File, size: u64, head: &[u8]) -> Result<Peeked> {
+    let length = head.first_chunk().map_or(0, |bytes| u64::from_le_bytes(*bytes));
+    let header = part(file, LENGTH, length.min(REACH * LENGTH))?;
+    let header: Option<Value> = serde_json::from_slice(&header).ok();
+    let text = header.as_ref().and_then(|h| h["__metadata__"][KEY].as_str());
+    let hilt: Value = text.and_then(|text| serde_json::from_str(text).ok()).unwrap_or_default();
+    let word = |value: &Value| value.as_str().map(String::from);
+    Ok(Peeked {
+        format: Format::Safetensors,
+        stage: word(&hilt["provenance"]["stage"]),
+        kind: word(&hilt["kind"]),
+        whole: header.is_some() && length.saturating_add(LENGTH) <= size,
+    })
+}
+
+fn in_json(text: &[u8]) -> Peeked {
+    let content: Option<Value> = serde_json::from_slice(text).ok();
+    let stage = content.as_ref().and_then(|c| c[KEY]["provenance"]["stage"].as_str()).map(String::from);
+    Peeked { format: Format::Json, stage, kind: None, whole: content.is_some() }
+}
+
+fn find_first(bytes: &[u8], needle: &[u8]) -> Option<usize> {
+    bytes.windows(needle.len()).position(|window| window == needle)
 }
 
 fn part(file: &mut File, from: u64, length: u64) -> Result<Vec<u8>> {
@@ -94,13 +131,4 @@ fn part(file: &mut File, from: u64, length: u64) -> Result<Vec<u8>> {
     file.seek(SeekFrom::Start(from))?;
     file.take(length).read_to_end(&mut bytes)?;
     Ok(bytes)
-}
-
-/// The text behind the last `"key":"`, as JSON has it, also within a JSON string and with a blank.
-fn value_of(text: &[u8], key: &str) -> Option<String> {
-    let forms = [format!("\"{key}\":\""), format!("\\\"{key}\\\":\\\""), format!("\"{key}\": \"")];
-    let (at, form) = forms.iter().filter_map(|form| Some((find_last(text, form.as_bytes())?, form))).max()?;
-    let rest = &text[at + form.len()..];
-    let word: String = rest.iter().take_while(|b| b.is_ascii_lowercase()).map(|b| char::from(*b)).collect();
-    Some(word).filter(|word| !word.is_empty())
 }

@@ -2,6 +2,7 @@
 
 use super::seal;
 use crate::error::{Error, Result};
+use crate::interrupt;
 use crate::tasks::Task;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -101,6 +102,7 @@ pub fn hash_path(path: &Path) -> Result<String> {
 }
 
 fn hash_file(path: &Path) -> Result<blake3::Hash> {
+    let _waits = interrupt::waiting();
     let file = fs::File::open(path).map_err(|e| Error::io(path, "read", e))?;
     let mut hash = blake3::Hasher::new();
     hash.update_reader(file).map_err(|e| Error::io(path, "read", e))?;
@@ -109,6 +111,7 @@ fn hash_file(path: &Path) -> Result<blake3::Hash> {
 
 /// Paths of all files below `root`, relative to it, sorted.
 pub(super) fn files_under(root: &Path) -> Result<Vec<PathBuf>> {
+    let _waits = interrupt::waiting();
     let (mut found, mut open) = (Vec::new(), vec![PathBuf::new()]);
     while let Some(inner) = open.pop() {
         let dir = root.join(&inner);

@@ -6,6 +6,8 @@ mod demos;
 mod fixtures;
 mod full_disk;
 mod interrupted;
+mod leaks;
+mod places;
 mod reproducible;
 mod resume;
 mod runs;

@@ -23,12 +23,12 @@ fn the_same_bytes(task: &'static str) {
         "recordings/episode-00003.mcap",
         "dataset/train/data/chunk-000/file-000.parquet",
         "dynamics.safetensors",
-        "dynamics.parquet",
-        "pretraining.parquet",
+        "dynamics.errors.parquet",
+        "dynamics.pretraining.parquet",
         "policy.safetensors",
-        "training.parquet",
+        "policy.training.parquet",
         "evaluation.json",
-        "evaluation.parquet",
+        "evaluation.episodes.parquet",
         "a.gif",
         "a.png",
     ] {
@@ -59,7 +59,7 @@ fn another_seed_gives_other_content() {
     let (one, two) = (whole("pick-up", 3, "2"), whole("pick-up", 4, "2"));
     // Beyond the seed that the provenance names.
     let tables = |run: &Run, name: &str| table_file::read(&run.at(name)).expect("a table").0;
-    for name in ["plans.parquet", "pretraining.parquet", "dynamics.parquet", "training.parquet", "evaluation.parquet"] {
+    for name in ["plans.parquet", "dynamics.pretraining.parquet", "dynamics.errors.parquet", "policy.training.parquet", "evaluation.episodes.parquet"] {
         assert_ne!(tables(&one, name), tables(&two, name), "{name}");
     }
     let episode = |run: &Run| recording::read(&run.at("recordings/episode-00000.mcap")).expect("a recording").0;

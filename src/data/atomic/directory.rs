@@ -70,7 +70,7 @@ pub(super) fn check_directory(path: &Path, ours: impl Fn(&Path) -> bool) -> Resu
             _ if ours(&name) => {}
             _ => {
                 let name = name.display();
-                let message = format!("holds \"{name}\", which this stage does not write; move it away or choose another place");
+                let message = format!("holds \"{name}\", which this stage does not write; empty it or choose another place");
                 return Err(Error::input(path, message));
             }
         }

@@ -13,10 +13,14 @@ pub(super) use temporary::is_temporary;
 use super::litter::{FileKind, kind_of_name};
 use crate::error::{Error, Result};
 use crate::interrupt;
+use rustix::fs::OFlags;
+use rustix::io::Errno;
 use std::fs::{self, File};
 use std::io::Write;
-use std::os::unix::fs::{MetadataExt, chown};
+use std::os::unix::fs::{MetadataExt, OpenOptionsExt, chown};
 use std::path::{Path, PathBuf};
+use std::thread::sleep;
+use std::time::{Duration, Instant};
 use tempfile::NamedTempFile;
 
 /// Writes a file of these bytes, creating the directories above it.
@@ -75,11 +79,26 @@ fn beside(path: &Path, place: &Path, bytes: &[u8]) -> Result<NamedTempFile> {
     Ok(file)
 }
 
-/// Into a device or a pipe. A pipe that nobody reads waits.
+/// How long a pipe may have no reader.
+const READER_PATIENCE: Duration = Duration::from_secs(5);
+/// How often is looked whether it has one.
+const READER_TICK: Duration = Duration::from_millis(20);
+
+/// Into a device or a pipe.
 fn write_into(place: &Path, bytes: &[u8]) -> std::io::Result<()> {
     let waits = interrupt::waiting();
-    let mut stream = File::options().write(true).open(place)?;
-    drop(waits);
+    let began = Instant::now();
+    // Opened without waiting, to learn whether a pipe has a reader; a write waits for the reader as usual.
+    let open = |flags: OFlags| File::options().write(true).custom_flags(flags.bits().cast_signed()).open(place);
+    let probe = loop {
+        match open(OFlags::NONBLOCK) {
+            Err(e) if e.raw_os_error() == Some(Errno::NXIO.raw_os_error()) && began.elapsed() < READER_PATIENCE => sleep(READER_TICK),
+            Err(e) if e.raw_os_error() == Some(Errno::NXIO.raw_os_error()) => return Err(std::io::Error::other("nobody reads this pipe")),
+            other => break other?,
+        }
+    };
+    let mut stream = open(OFlags::empty())?;
+    drop((probe, waits));
     stream.write_all(bytes)
 }
 

@@ -11,9 +11,11 @@ mod meta;
 mod read;
 mod split;
 mod stats;
+mod twins;
 
 pub use read::{Dataset, read, read_for};
 pub use split::split;
+pub use twins::{first_shared, first_twins};
 
 use super::{Provenance, atomic, parquet_file};
 use crate::demo::{Demo, Episode};

@@ -50,15 +50,15 @@ pub fn file_name(index: u64) -> String {
     format!("episode-{index:05}.mcap")
 }
 
-/// Whether a name is one that [`file_name`] gives.
-pub fn is_file_name(name: &str) -> bool {
-    let digits = name.strip_prefix("episode-").and_then(|n| n.strip_suffix(".mcap"));
-    digits.is_some_and(|d| d.len() >= 5 && d.bytes().all(|b| b.is_ascii_digit()))
+/// The number in a name that [`file_name`] gives; `None` for every other name.
+pub fn number_of(name: &str) -> Option<u64> {
+    let digits = name.strip_prefix("episode-")?.strip_suffix(".mcap")?;
+    digits.parse().ok().filter(|number| file_name(*number) == name)
 }
 
 /// Whether a path below a directory of recordings is one of a recording.
 pub fn is_file(path: &Path) -> bool {
-    path.to_str().is_some_and(is_file_name)
+    path.to_str().and_then(number_of).is_some()
 }
 
 /// The recordings in a directory, by name; hidden and foreign files do not count.
