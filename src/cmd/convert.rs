@@ -44,7 +44,8 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome> {
     let (mut kept, outcome) = dropped::keep("convert", read, ADVICE, &context.console)?;
     let wanted = pipeline.convert.demos as usize;
     if kept.len() < wanted {
-        context.console.say(&format!("convert: {} demos where {wanted} are wanted; raise plan.episodes for more", kept.len()));
+        let (all, up_to) = (kept.len(), format!("convert.demos would take up to {wanted}"));
+        context.console.say(&format!("convert: takes all {all} demos; {up_to}, plan more episodes if you want more"));
     } else if wanted > 0 {
         kept.truncate(wanted);
     }
@@ -77,7 +78,7 @@ fn load(path: &Path, task: Task, keep_failed: bool) -> Result<dropped::Kept<(Epi
     let (episode, _) = recording::read(path)?;
     same_task(path, episode.scene.task, task)?;
     match episode.failure {
-        Some(class) if !keep_failed => Ok(Err(format!("episode {}: {}", episode.index, class.name()))),
+        Some(class) if !keep_failed => Ok(Err(format!("episode {} failed, {}: {}", episode.index, class.name(), class.words()))),
         _ => {
             let demo = episode.to_demo().map_err(|why| Error::input(path, why))?;
             Ok(Ok((episode, demo)))

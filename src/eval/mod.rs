@@ -125,10 +125,11 @@ impl<'a> Rollouts<'a> {
             .map(|index| {
                 interrupt.check()?;
                 let scene = self.scene(index)?;
-                let episode = make_controller(index, &scene)?.map(|mut controller| {
+                let run = |mut controller: Box<dyn Controller>| {
                     let mut disturbance = Disturbance::new(&settings, self.stream("noise", index));
-                    run_episode(index, &scene, controller.as_mut(), &mut disturbance, self.horizon_steps)
-                });
+                    run_episode(index, &scene, controller.as_mut(), &mut disturbance, self.horizon_steps, interrupt)
+                };
+                let episode = make_controller(index, &scene)?.map(run).transpose()?;
                 done(episode.as_ref())?;
                 Ok(episode.map_or_else(|| unplanned(index, scene), |episode| Trial::of(&episode)))
             })
