@@ -79,9 +79,10 @@ impl Pipeline {
             }
             Source::File(path, task) => (path.display().to_string(), read(path)?, *task),
         };
-        let mut table: toml::Table = text
-            .parse()
-            .map_err(|e: toml::de::Error| Error::Usage(format!("{origin} is not valid TOML: {}", e.to_string().trim_end())))?;
+        let mut table: toml::Table = text.parse().map_err(|e: toml::de::Error| {
+            let why: Vec<String> = e.to_string().trim_end().lines().map(shown).collect();
+            Error::Usage(format!("{origin} is not valid TOML: {}", why.join("\n")))
+        })?;
         agree_on_task(&mut table, task, &origin)?;
         let mut pipeline = check::resolve(table.clone(), &origin)?;
         for set in sets {

@@ -141,8 +141,9 @@ pub(super) fn smooth_path(path: &[[f64; JOINTS]], limits: &Limits, interrupt: &I
 }
 
 fn too_long(steps: f64) -> String {
+    let steps = if steps < 1e9 { format!("{steps:.0}") } else { format!("{steps:.0e}") };
     format!(
-        "it would take {steps:.0} control steps, and simulate.max_steps can allow no more than {MOST_STEPS}; raise plan.speed or \
+        "it would take {steps} control steps, and simulate.max_steps can allow no more than {MOST_STEPS}; raise plan.speed or \
          plan.max_acceleration_rad_s2"
     )
 }

@@ -53,9 +53,10 @@ pub fn reexecute(
 mod tests {
     use super::*;
     use crate::config::PulseSettings;
+    use crate::scene::Obstacle;
     use crate::seed::stream;
     use crate::sim::World;
-    use crate::tasks::{Task, draw_scene};
+    use crate::tasks::{FailureClass, Task, draw_scene};
 
     #[test]
     fn commands_without_noise_lead_where_they_led_and_with_noise_elsewhere() {
@@ -79,5 +80,17 @@ mod tests {
         };
         assert!(again(0.0) < 1e-5, "{}", again(0.0));
         assert!(again(0.001) > 1e-3, "{}", again(0.001));
+    }
+
+    #[test]
+    fn a_demo_whose_execution_breaks_down_is_no_panic() {
+        let touching = Obstacle { center_m: [0.0, 0.0, 0.3], size_m: [0.02; 3] };
+        let settings = SceneSettings { obstacles: vec![touching], ..SceneSettings::default() };
+        let scene = draw_scene(Task::PickUp, &SceneSettings::default(), &mut stream(3, "scene", 0)).expect("there is room");
+        let start = World::new(&scene).observe().state.to_row();
+        let (states, still) = ([start.clone(), start].concat(), vec![0.0; JOINTS]);
+        let demo = Demo::new(Task::PickUp, states, still.clone(), still).expect("lengths match");
+        let episode = reexecute(0, &demo, &settings, &SimulateSettings::default(), stream(4, "noise", 0), &Interrupt::default());
+        assert_eq!(episode.expect("no error").failure, Some(FailureClass::SimulationBrokeDown));
     }
 }
