@@ -5,7 +5,8 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// What any module may use: contracts, errors, randomness, settings.
-const EVERYWHERE: [&str; 10] = ["config", "demo", "error", "interrupt", "pulse", "scene", "seed", "state", "table", "tensor"];
+const EVERYWHERE: [&str; 12] =
+    ["config", "demo", "error", "guard", "interrupt", "pulse", "scene", "seed", "state", "table", "tensor", "words"];
 
 /// What else each module may use. A module that is not here is refused, so that a new one gets its place on purpose.
 const FLOW: [(&str, &[&str]); 17] = [

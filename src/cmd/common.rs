@@ -4,6 +4,7 @@ use super::places::Places;
 use crate::config::{Pipeline, Preset, Source, Stage};
 use crate::data::Provenance;
 use crate::error::{Error, Result};
+use crate::plan::check_ready_pose;
 use crate::tasks::Task;
 use std::path::{Path, PathBuf};
 
@@ -55,7 +56,9 @@ impl SettingsArgs {
         let given: Vec<(String, String)> =
             flags.iter().filter_map(|(key, value)| value.as_ref().map(|v| (format!("{key}={v}"), flag_text(key, v)))).collect();
         let sets: Vec<String> = self.set.iter().chain(given.iter().map(|(set, _)| set)).cloned().collect();
-        Pipeline::load(&source, &sets).map_err(|e| in_words_of_flags(e, &given))
+        let pipeline = Pipeline::load(&source, &sets).map_err(|e| in_words_of_flags(e, &given))?;
+        check_ready_pose(&pipeline.scene)?;
+        Ok(pipeline)
     }
 
     /// What made an artefact of `stage`: the settings it reads, the seed, the hashes of its inputs by role ("plans", "dataset").

@@ -63,7 +63,8 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome> {
     say_of_runs(&kept, &context.console);
     let wanted = pipeline.convert.demos as usize;
     if kept.len() < wanted {
-        context.console.say(&format!("convert: {} demos where {wanted} are wanted; raise plan.episodes for more", kept.len()));
+        let (all, up_to) = (kept.len(), format!("convert.demos would take up to {wanted}"));
+        context.console.say(&format!("convert: takes all {all} demos; {up_to}, plan more episodes if you want more"));
     } else if wanted > 0 {
         kept.truncate(wanted);
     }
@@ -82,7 +83,7 @@ fn load(path: &Path, task: Task, keep_failed: bool) -> Result<dropped::Kept<Load
     same_task(path, episode.scene.task, task)?;
     let number = path.file_name().and_then(|name| recording::number_of(name.to_str()?)).unwrap_or(episode.index);
     match episode.failure {
-        Some(class) if !keep_failed => Ok(Err(format!("episode {number}: {}", class.name()))),
+        Some(class) if !keep_failed => Ok(Err(format!("episode {number} failed, {}: {}", class.name(), class.words()))),
         _ => {
             let demo = episode.to_demo().map_err(|why| Error::input(path, why))?;
             Ok(Ok(Loaded { number, episode, demo, seed: made.seed }))

@@ -8,6 +8,7 @@ use crate::data::{atomic, json_file, recording, table_file, weights};
 use crate::demo::Episode;
 use crate::error::{Error, Result};
 use crate::eval::{PolicyController, Rollouts, Summary, Trial, to_table};
+use crate::interrupt::Interrupt;
 use crate::learn::Policy;
 use crate::plan::Planner;
 use crate::report::table::text_table;
@@ -160,11 +161,12 @@ impl Subject {
     }
 
     /// A controller for one episode; `None` when the demonstrator finds no plan.
-    fn controller(&self, rollouts: &Rollouts, index: u64, scene: &Scene) -> Option<Box<dyn Controller>> {
+    fn controller(&self, rollouts: &Rollouts, index: u64, scene: &Scene, interrupt: &Interrupt) -> Option<Box<dyn Controller>> {
         match self {
             Subject::Planner => {
                 let mut rng = seed::stream(rollouts.seed, "evaluate.search", index);
-                let plan = Planner::new(&rollouts.pipeline.plan).plan(index, scene, &mut rng).ok()?;
+                let mut planner = Planner::new(&rollouts.pipeline.plan).with_interrupt(interrupt);
+                let plan = planner.plan(index, scene, &mut rng).ok()?;
                 Some(Box::new(Follower::new(&plan)?))
             }
             Subject::Policy(policy) => {
@@ -181,7 +183,10 @@ where
     K: Fn(&Episode) -> Result<()> + Sync,
 {
     let progress = context.console.progress("evaluate", rollouts.episodes, "episodes");
-    let make = |index, scene: &Scene| Ok(subject.controller(rollouts, index, scene));
+    let make = |index, scene: &Scene| {
+        let controller = subject.controller(rollouts, index, scene, &context.interrupt);
+        context.interrupt.check().map(|()| controller)
+    };
     let trials = rollouts.run(make, &context.interrupt, |episode| {
         progress.step();
         episode.map_or(Ok(()), &keep)

@@ -1,12 +1,13 @@
 use super::common::{SettingsArgs, path_or};
 use super::epochs::Epochs;
 use super::places::{Content, beside};
-use super::{Context, Outcome, output};
+use super::{Context, Outcome, dropped, output};
 use crate::config::{Pipeline, SimulateSettings, Stage};
 use crate::data::{atomic, dataset, table_file, weights};
 use crate::demo::Demo;
 use crate::error::{Error, Result};
 use crate::learn::{EpochMetrics, pretrain_dynamics};
+use crate::tasks::FailureClass;
 use crate::{seed, sim};
 use rayon::prelude::*;
 use std::path::{Path, PathBuf};
@@ -39,7 +40,8 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome> {
     let provenance = args.settings.provenance(Stage::Pretrain, &pipeline, &[("dataset", &dir)])?;
 
     let seed = args.settings.seed;
-    train.extend(reexecute(&train, &pipeline, seed, context)?);
+    let (again, outcome) = reexecute(&train, &pipeline, seed, context)?;
+    train.extend(again);
     let mut epochs = Epochs::new(&context.console);
     let mut log = |epoch: &EpochMetrics| epochs.step(epoch);
     let (dynamics, report) = pretrain_dynamics(&train, &validation, &pipeline.pretrain, seed, &mut log, &context.interrupt)?;
@@ -50,14 +52,17 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome> {
     let weights = weights::encode(&out, KIND, &dynamics.to_tensors(), &dynamics.meta(), &provenance)?;
     atomic::write_all(&[(errors, error_table), (metrics, metric_table), (out.clone(), weights)])?;
     context.console.say(&format!("pretrain: wrote {}", out.display()));
-    Ok(Outcome::Done)
+    Ok(outcome)
 }
 
-/// The demos' commands executed again in the simulator, `pretrain.reexecute` times each.
-fn reexecute(demos: &[Demo], pipeline: &Pipeline, seed: u64, context: &Context) -> Result<Vec<Demo>> {
+/// For when no command could be executed again.
+const ADVICE: &str = "change scene.obstacles, scene.friction or scene.block_mass_kg, or set pretrain.reexecute = 0";
+
+/// The demos' commands executed again in the simulator, `pretrain.reexecute` times each; without those in which it broke down.
+fn reexecute(demos: &[Demo], pipeline: &Pipeline, seed: u64, context: &Context) -> Result<(Vec<Demo>, Outcome)> {
     let times = pipeline.pretrain.reexecute;
     if times == 0 {
-        return Ok(Vec::new());
+        return Ok((Vec::new(), Outcome::Done));
     }
     let settings = SimulateSettings { pulses: pipeline.pretrain.reexecute_pulses.clone(), ..pipeline.simulate.clone() };
     let progress = context.console.progress("re-execute", times * demos.len() as u64, "episodes");
@@ -65,13 +70,19 @@ fn reexecute(demos: &[Demo], pipeline: &Pipeline, seed: u64, context: &Context) 
         context.interrupt.check()?;
         let demo = &demos[(index / times) as usize];
         let rng = seed::stream(seed, "pretrain.reexecute", index);
-        let episode = sim::reexecute(index, demo, &pipeline.scene, &settings, rng);
+        let episode = sim::reexecute(index, demo, &pipeline.scene, &settings, rng, &context.interrupt)?;
         progress.step();
-        episode.to_demo().map_err(|why| Error::Failed(format!("training demo {} executed again: {why}", index / times)))
+        let what = format!("training demo {}", index / times);
+        match episode.failure {
+            Some(class @ (FailureClass::SimulationBrokeDown | FailureClass::CommandNotFinite)) => {
+                Ok(Err(format!("{what}: {}", class.words())))
+            }
+            _ => episode.to_demo().map(Ok).map_err(|why| Error::Failed(format!("{what} executed again: {why}"))),
+        }
     });
-    let again = again.collect::<Result<_>>()?;
+    let again = again.collect::<Result<Vec<dropped::Kept<Demo>>>>()?;
     progress.finish("");
-    Ok(again)
+    dropped::keep("re-execute", again, ADVICE, &context.console)
 }
 
 /// Training and validation demos.

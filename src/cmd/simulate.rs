@@ -51,7 +51,8 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome> {
         let mut disturbance = Disturbance::new(&pipeline.simulate, noise);
         let unusable = || Error::input(&path, format!("plan {} has no approach or no carry; run `hilt plan` again", plan.index));
         let mut follower = Follower::new(plan).ok_or_else(unusable)?;
-        let episode = run_episode(plan.index, &plan.scene, &mut follower, &mut disturbance, pipeline.simulate.max_steps);
+        let max_steps = pipeline.simulate.max_steps;
+        let episode = run_episode(plan.index, &plan.scene, &mut follower, &mut disturbance, max_steps, &context.interrupt)?;
         solved.fetch_add(u64::from(episode.success), Ordering::Relaxed);
         steps.fetch_add(episode.steps.len() as u64, Ordering::Relaxed);
         let file = dir.join(recording::file_name(plan.index));

@@ -12,6 +12,7 @@ use crate::learn::{Checkpoint, Dynamics, Hooks, Method, Policy, Selection, train
 use crate::scene::Scene;
 use crate::sim::Controller;
 use crate::tasks::Task;
+use crate::words::did_you_mean;
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -142,6 +143,9 @@ fn method(name: &str) -> std::result::Result<Method, String> {
         "hil" => Ok(Method::Hil),
         "bc" => Ok(Method::Bc),
         "sc" => Ok(Method::Sc),
-        _ => Err(format!("unknown method \"{name}\"; allowed: hil (both losses), bc (behavior cloning), sc (state cloning)")),
+        _ => {
+            let hint = did_you_mean(name, ["hil", "bc", "sc"]);
+            Err(format!("unknown method \"{name}\"{hint}; allowed: hil (both losses), bc (behavior cloning), sc (state cloning)"))
+        }
     }
 }

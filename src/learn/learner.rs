@@ -4,6 +4,7 @@ use super::behavior_cloning::{self as bc, Cloned, draw_noise, policy_gradient};
 use super::corpus::{Corpus, Samples};
 use super::dynamics::Dynamics;
 use super::fine_tuning::Model;
+use super::limits::{affordable, before_the_first_update};
 use super::metrics::{EpochMetrics, action_errors};
 use super::policy::Policy;
 use super::pushes::Pushes;
@@ -85,9 +86,15 @@ impl Learner {
                 other.state_dim()
             )));
         }
+        let most_rows = settings.bc_batch.max(settings.batch * corpus.longest()).min(corpus.rows());
+        affordable(
+            most_rows,
+            settings.hidden_layers,
+            settings.hidden_units,
+            "train.batch, train.bc_batch or train.hidden_units",
+        )?;
         let policy = Policy::new(&corpus, settings, &mut stream(seed, "train.init", 0));
         let model = dynamics.map(|dynamics| Model::new(dynamics, &corpus, &held_out));
-        let most_rows = settings.bc_batch.max(settings.batch * corpus.longest()).min(corpus.rows());
         Ok(Learner {
             seed,
             updates: 0,
@@ -193,6 +200,13 @@ impl Learner {
     fn finite(&self, term: &str, value: f64, remedy: &str) -> Result<()> {
         if value.is_finite() {
             return Ok(());
+        }
+        if self.draws == 1 {
+            return Err(Error::Failed(before_the_first_update(
+                term,
+                value,
+                "train.initial_std, train.tau and the networks' weights",
+            )));
         }
         Err(Error::Failed(format!("{term} is {value} after {} updates of the stage: {remedy}", self.updates)))
     }

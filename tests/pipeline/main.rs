@@ -3,6 +3,7 @@
 mod bad_input;
 mod bad_numbers;
 mod demos;
+mod ends;
 mod fixtures;
 mod full_disk;
 mod interrupted;
