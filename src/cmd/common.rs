@@ -2,7 +2,7 @@
 
 use super::places::Places;
 use crate::config::{Pipeline, Preset, Source, Stage};
-use crate::data::Provenance;
+use crate::data::{ContentHash, Provenance};
 use crate::error::{Error, Result};
 use crate::plan::check_ready_pose;
 use crate::tasks::Task;
@@ -61,13 +61,13 @@ impl SettingsArgs {
         Ok(pipeline)
     }
 
-    /// What made an artefact of `stage`: the settings it reads, the seed, the hashes of its inputs by role ("plans", "dataset").
+    /// What made an artefact of `stage`: the settings it reads, the seed, the hashes of what it has read by role ("plans", "dataset").
     ///
     /// # Errors
-    /// [`Error::Io`] when an input cannot be read.
-    pub fn provenance(&self, stage: Stage, pipeline: &Pipeline, inputs: &[(&str, &Path)]) -> Result<Provenance> {
+    /// [`Error::Failed`] when a setting has no form in JSON.
+    pub fn provenance(&self, stage: Stage, pipeline: &Pipeline, inputs: &[(&str, ContentHash)]) -> Result<Provenance> {
         let provenance = Provenance::new(stage.name(), pipeline.task, pipeline.to_json(stage)?, self.seed);
-        inputs.iter().try_fold(provenance, |provenance, (role, path)| provenance.with_input(role, path))
+        Ok(inputs.iter().fold(provenance, |provenance, (role, content)| provenance.with_input(role, content)))
     }
 }
 

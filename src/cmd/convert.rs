@@ -2,7 +2,7 @@ use super::common::{SettingsArgs, path_or, same_task};
 use super::places::Content;
 use super::{Console, Context, Outcome, dropped};
 use crate::config::Stage;
-use crate::data::{dataset, recording};
+use crate::data::{ContentHash, dataset, recording};
 use crate::demo::{Demo, Episode};
 use crate::error::{Error, Result};
 use crate::tasks::Task;
@@ -46,7 +46,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome> {
     }
 
     let progress = context.console.progress("convert", files.len() as u64, "recordings");
-    let read: Vec<Result<_>> = files
+    let read: Vec<Result<(ContentHash, dropped::Kept<_>)>> = files
         .par_iter()
         .map(|path| {
             context.interrupt.check()?;
@@ -56,7 +56,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome> {
         })
         .collect();
     // One after the other: of several that cannot be used the first by name is told, whatever the threads.
-    let read = read.into_iter().collect::<Result<Vec<dropped::Kept<_>>>>()?;
+    let (hashes, read): (Vec<_>, Vec<_>) = read.into_iter().collect::<Result<Vec<_>>>()?.into_iter().unzip();
     progress.finish("");
     let (mut kept, outcome) = dropped::keep("convert", read, ADVICE, &context.console)?;
     refuse_twins(&dir, &kept)?;
@@ -71,24 +71,28 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome> {
 
     let (train, validation) = dataset::split(kept.len(), pipeline.convert.train_per_validation, args.settings.seed);
     let pick = |indices: &[usize]| -> Vec<_> { indices.iter().map(|i| kept[*i].for_dataset()).collect() };
-    let provenance = args.settings.provenance(Stage::Convert, &pipeline, &[("recordings", &dir)])?;
+    let names = files.iter().filter_map(|path| path.file_name()?.to_str());
+    let content = ContentHash::of_directory(names.zip(hashes));
+    let provenance = args.settings.provenance(Stage::Convert, &pipeline, &[("recordings", content)])?;
     dataset::write_split(&out, pipeline.task, &pick(&train), &pick(&validation), &provenance, &context.interrupt)?;
     let (to, t, v) = (out.display(), train.len(), validation.len());
     context.console.say(&format!("convert: wrote {to}: {t} training and {v} validation episodes"));
     Ok(outcome)
 }
 
-fn load(path: &Path, task: Task, keep_failed: bool) -> Result<dropped::Kept<Loaded>> {
-    let (episode, made) = recording::read(path)?;
+/// A recording, and the hash of its bytes; a failed episode is dropped.
+fn load(path: &Path, task: Task, keep_failed: bool) -> Result<(ContentHash, dropped::Kept<Loaded>)> {
+    let (episode, made, hash) = recording::read_hashed(path)?;
     same_task(path, episode.scene.task, task)?;
     let number = path.file_name().and_then(|name| recording::number_of(name.to_str()?)).unwrap_or(episode.index);
-    match episode.failure {
-        Some(class) if !keep_failed => Ok(Err(format!("episode {number} failed, {}: {}", class.name(), class.words()))),
+    let kept = match episode.failure {
+        Some(class) if !keep_failed => Err(format!("episode {number} failed, {}: {}", class.name(), class.words())),
         _ => {
             let demo = episode.to_demo().map_err(|why| Error::input(path, why))?;
-            Ok(Ok(Loaded { number, episode, demo, seed: made.seed }))
+            Ok(Loaded { number, episode, demo, seed: made.seed })
         }
-    }
+    };
+    Ok((hash, kept))
 }
 
 impl Loaded {
@@ -101,7 +105,8 @@ impl Loaded {
 fn refuse_twins(dir: &Path, loaded: &[Loaded]) -> Result<()> {
     let Some((one, other)) = dataset::first_twins(loaded.iter().map(|l| &l.demo)) else { return Ok(()) };
     let [one, other] = [one, other].map(|at| recording::file_name(loaded[at].number));
-    let message = format!("is the same episode as {one}, in every number: both could land in training and validation; remove one of them");
+    let message =
+        format!("is the same episode as {one}, in every number: both could land in training and validation; remove one of them");
     Err(Error::input(&dir.join(other), message))
 }
 
@@ -110,6 +115,9 @@ fn say_of_runs(loaded: &[Loaded], console: &Console) {
     let seeds: BTreeSet<u64> = loaded.iter().map(|l| l.seed).collect();
     if seeds.len() > 1 {
         let seeds: Vec<String> = seeds.iter().map(u64::to_string).collect();
-        console.say(&format!("convert: the recordings are of several runs, seeds {}; episodes go by their files' numbers", seeds.join(", ")));
+        console.say(&format!(
+            "convert: the recordings are of several runs, seeds {}; episodes go by their files' numbers",
+            seeds.join(", ")
+        ));
     }
 }

@@ -1,10 +1,10 @@
 use super::common::{SettingsArgs, path_or, same_task};
-use super::places::{Content, Places, beside};
 use super::differences::{Difference, differences};
+use super::places::{Content, Places, beside};
 use super::{Console, Context, Outcome, output, train};
 use crate::config::{Pipeline, Stage};
 use crate::data::provenance::Provenance;
-use crate::data::{atomic, json_file, recording, table_file, weights};
+use crate::data::{ContentHash, atomic, json_file, recording, table_file, weights};
 use crate::demo::Episode;
 use crate::error::{Error, Result};
 use crate::eval::{PolicyController, Rollouts, Summary, Trial, to_table};
@@ -68,8 +68,8 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome> {
     let (subject, inputs, trained) = match path.as_path() {
         planner if planner == Path::new(PLANNER) => (Subject::Planner, vec![], None),
         file => {
-            let (policy, made) = read_policy(file, &pipeline)?;
-            (Subject::Policy(Arc::new(policy)), vec![("policy", file)], Some(made.settings))
+            let (policy, made, content) = read_policy(file, &pipeline)?;
+            (Subject::Policy(Arc::new(policy)), vec![("policy", content)], Some(made.settings))
         }
     };
     let horizon_steps = subject.horizon_steps(&pipeline);
@@ -113,10 +113,10 @@ impl Args {
     }
 }
 
-fn read_policy(path: &Path, pipeline: &Pipeline) -> Result<(Policy, Provenance)> {
-    let (tensors, meta, made) = weights::read(path, train::KIND)?;
+fn read_policy(path: &Path, pipeline: &Pipeline) -> Result<(Policy, Provenance, ContentHash)> {
+    let (tensors, meta, made, content) = weights::read_hashed(path, train::KIND)?;
     same_task(path, made.task, pipeline.task)?;
-    Ok((Policy::from_tensors(&tensors, &meta).map_err(|why| Error::input(path, why))?, made))
+    Ok((Policy::from_tensors(&tensors, &meta).map_err(|why| Error::input(path, why))?, made, content))
 }
 
 /// Sections of the settings that make an episode what it is.
@@ -129,7 +129,8 @@ fn of_scene(trained: &Value, here: &Value) -> Vec<Difference> {
 
 fn say_of_scene(foreign: &[Difference], console: &Console) {
     for Difference { key, theirs, ours } in foreign {
-        console.say(&format!("evaluate: {key} is {ours}, the policy was trained with {theirs}: another scene than it has learned"));
+        console
+            .say(&format!("evaluate: {key} is {ours}, the policy was trained with {theirs}: another scene than it has learned"));
     }
 }
 

@@ -1,8 +1,8 @@
 //! What a command reads and writes, checked before any work: nothing of the user's is replaced that the command does not replace on purpose.
 
 use super::Console;
-use crate::data::peek::{Format, Peeked, peek};
 use crate::data::atomic::{self, Target};
+use crate::data::peek::{Format, Peeked, peek};
 use crate::data::{dataset, recording};
 use crate::error::{Error, Result};
 use std::ffi::OsStr;
@@ -108,10 +108,12 @@ impl Places {
                 }
             }
             for (other_name, other, _) in &self.writes[..i] {
-                let apart = place_of(other)?.is_none_or(|other| !same(&place, &other) && !other.starts_with(&place) && !place.starts_with(&other));
+                let apart = place_of(other)?
+                    .is_none_or(|other| !same(&place, &other) && !other.starts_with(&place) && !place.starts_with(&other));
                 if !apart {
                     let (path, other) = (path.display(), other.display());
-                    let message = format!("{other_name} {other} and {name} {path} are written by this command, to one place; choose two");
+                    let message =
+                        format!("{other_name} {other} and {name} {path} are written by this command, to one place; choose two");
                     return Err(Error::Usage(message));
                 }
             }

@@ -3,13 +3,14 @@ use super::epochs::Epochs;
 use super::places::{Content, beside};
 use super::{Context, Outcome, dropped, output};
 use crate::config::{Pipeline, SimulateSettings, Stage};
-use crate::data::{atomic, dataset, table_file, weights};
+use crate::data::{ContentHash, atomic, dataset, table_file, weights};
 use crate::demo::Demo;
 use crate::error::{Error, Result};
 use crate::learn::{EpochMetrics, pretrain_dynamics};
 use crate::tasks::FailureClass;
 use crate::{seed, sim};
 use rayon::prelude::*;
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 /// Kind of the weights that this stage writes.
@@ -36,8 +37,8 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome> {
     let places = args.settings.places().read(&dir).write("--out", &out, Content::Weights(KIND, "pretrain"));
     let places = places.write("the table of errors", &errors, Content::Table("pretrain"));
     places.write("the table of epochs", &metrics, Content::Table("pretrain")).check(&context.console)?;
-    let (mut train, validation) = demos(&dir, &pipeline)?;
-    let provenance = args.settings.provenance(Stage::Pretrain, &pipeline, &[("dataset", &dir)])?;
+    let Demos { mut train, validation, content } = demos(&dir, &pipeline)?;
+    let provenance = args.settings.provenance(Stage::Pretrain, &pipeline, &[("dataset", content)])?;
 
     let seed = args.settings.seed;
     let (again, outcome) = reexecute(&train, &pipeline, seed, context)?;
@@ -85,14 +86,28 @@ fn reexecute(demos: &[Demo], pipeline: &Pipeline, seed: u64, context: &Context) 
     dropped::keep("re-execute", again, ADVICE, &context.console)
 }
 
+/// What is learned from, and on what it is judged.
+pub struct Demos {
+    pub train: Vec<Demo>,
+    pub validation: Vec<Demo>,
+    /// Of both datasets, as they were read.
+    pub content: ContentHash,
+}
+
 /// Training and validation demos.
 ///
 /// # Errors
-/// What reading returns; [`Error::Input`] when there is no validation demo: a dataset of one episode has none.
-pub fn demos(dir: &Path, pipeline: &Pipeline) -> Result<(Vec<Demo>, Vec<Demo>)> {
-    let train = dataset::read_for(&dir.join(dataset::TRAIN), pipeline.task)?.demos;
-    let root = dir.join(dataset::VALIDATION);
-    let validation = if root.exists() { dataset::read_for(&root, pipeline.task)?.demos } else { Vec::new() };
+/// What reading returns; [`Error::Input`] when there is no validation demo (a dataset of one episode has none), or when one is a training
+/// demo too.
+pub fn demos(dir: &Path, pipeline: &Pipeline) -> Result<Demos> {
+    let mut files = BTreeMap::new();
+    let mut read = |name: &str| -> Result<Vec<Demo>> {
+        let found = dataset::read_for(&dir.join(name), pipeline.task)?;
+        files.extend(found.files.into_iter().map(|(file, hash)| (format!("{name}/{file}"), hash)));
+        Ok(found.demos)
+    };
+    let train = read(dataset::TRAIN)?;
+    let validation = if dir.join(dataset::VALIDATION).exists() { read(dataset::VALIDATION)? } else { Vec::new() };
     if validation.is_empty() {
         let (count, ratio) = (train.len(), pipeline.convert.train_per_validation);
         return Err(Error::input(
@@ -110,5 +125,6 @@ pub fn demos(dir: &Path, pipeline: &Pipeline) -> Result<(Vec<Demo>, Vec<Demo>)> 
         );
         return Err(Error::input(dir, message));
     }
-    Ok((train, validation))
+    let content = ContentHash::of_directory(files.iter().map(|(name, hash)| (name.as_str(), *hash)));
+    Ok(Demos { train, validation, content })
 }

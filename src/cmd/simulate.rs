@@ -33,7 +33,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome> {
     let path = path_or(args.plans.as_deref(), pipeline.task, "plans.parquet");
     let out = path_or(args.out.as_deref(), pipeline.task, "recordings");
     args.settings.places().read(&path).write("--out", &out, Content::Recordings("simulate")).check(&context.console)?;
-    let (table, made) = table_file::read(&path)?;
+    let (table, made, content) = table_file::read_hashed(&path)?;
     same_task(&path, made.task, pipeline.task)?;
     let mut plans = from_table(&table).map_err(|why| Error::input(&path, why))?;
     plans.truncate(args.episodes.map_or(usize::MAX, |n| n as usize));
@@ -41,7 +41,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome> {
         return Err(Error::input(&path, "holds no plan; run `hilt plan` again"));
     }
     let robot = urdf();
-    let provenance = args.settings.provenance(Stage::Simulate, &pipeline, &[("plans", &path)])?;
+    let provenance = args.settings.provenance(Stage::Simulate, &pipeline, &[("plans", content)])?;
 
     let progress = context.console.progress("simulate", plans.len() as u64, "episodes");
     let (solved, steps) = (AtomicU64::new(0), AtomicU64::new(0));

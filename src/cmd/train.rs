@@ -4,7 +4,7 @@ use super::epochs::Epochs;
 use super::places::{Content, beside};
 use super::{Console, Context, Outcome, pretrain};
 use crate::config::{Pipeline, Stage};
-use crate::data::{atomic, table_file, weights};
+use crate::data::{ContentHash, atomic, table_file, weights};
 use crate::error::{Error, Result};
 use crate::eval::{PolicyController, Rollouts};
 use crate::interrupt::Interrupt;
@@ -65,14 +65,14 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome> {
     let needs_model = args.method != Method::Bc || args.dynamics.is_some();
     let kept = beside(&out, checkpoint::ENDING);
     let places = args.settings.places().read(&dir).read_all(needs_model.then_some(model.as_path()));
-    let places = places.write("--out", &out, Content::Weights(KIND, "train")).write("--metrics", &metrics, Content::Table("train"));
+    let places =
+        places.write("--out", &out, Content::Weights(KIND, "train")).write("--metrics", &metrics, Content::Table("train"));
     let checkpoint = if args.resume { Content::Own } else { Content::Weights(weights::CHECKPOINT, "train") };
     places.write("the checkpoint", &kept, checkpoint).check(&context.console)?;
-    let (demos, validation) = pretrain::demos(&dir, &pipeline)?;
-    let dynamics = needs_model.then(|| read_dynamics(&model, pipeline.task)).transpose()?;
-    let all = [("dataset", dir.as_path()), ("dynamics", model.as_path())];
-    let inputs = if needs_model { &all[..] } else { &all[..1] };
-    let mut provenance = args.settings.provenance(Stage::Train, &pipeline, inputs)?;
+    let pretrain::Demos { train: demos, validation, content } = pretrain::demos(&dir, &pipeline)?;
+    let (dynamics, model) = needs_model.then(|| read_dynamics(&model, pipeline.task)).transpose()?.unzip();
+    let inputs: Vec<_> = [("dataset", content)].into_iter().chain(model.map(|content| ("dynamics", content))).collect();
+    let mut provenance = args.settings.provenance(Stage::Train, &pipeline, &inputs)?;
     provenance.settings["method"] = format!("{:?}", args.method).to_lowercase().into();
 
     let (console, seed) = (&context.console, args.settings.seed);
@@ -132,10 +132,10 @@ fn stated(selection: &Selection, episodes: u64, seed: u64) -> Value {
     json!({ "episodes": episodes, "seed": seed, "candidates": selection.candidates, "chosen": selection.best() })
 }
 
-fn read_dynamics(path: &Path, task: Task) -> Result<Dynamics> {
-    let (tensors, meta, made) = weights::read(path, pretrain::KIND)?;
+fn read_dynamics(path: &Path, task: Task) -> Result<(Dynamics, ContentHash)> {
+    let (tensors, meta, made, content) = weights::read_hashed(path, pretrain::KIND)?;
     same_task(path, made.task, task)?;
-    Dynamics::from_tensors(&tensors, &meta).map_err(|why| Error::input(path, why))
+    Ok((Dynamics::from_tensors(&tensors, &meta).map_err(|why| Error::input(path, why))?, content))
 }
 
 fn method(name: &str) -> std::result::Result<Method, String> {

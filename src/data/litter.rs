@@ -21,7 +21,8 @@ const LITTER_BEGINS: [&str; 3] = [".nfs", "._", ".fuse_hidden"];
 /// Of a path: what its last name says.
 pub fn kind_of_name(path: &Path) -> FileKind {
     let name = path.file_name().unwrap_or_default().to_string_lossy();
-    if LITTER.contains(&&*name) || LITTER_BEGINS.iter().any(|begin| name.starts_with(begin)) || super::atomic::is_temporary(&name) {
+    if LITTER.contains(&&*name) || LITTER_BEGINS.iter().any(|begin| name.starts_with(begin)) || super::atomic::is_temporary(&name)
+    {
         return FileKind::Litter;
     }
     if name.starts_with('.') { FileKind::Hidden } else { FileKind::Plain }

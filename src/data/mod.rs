@@ -9,8 +9,8 @@ mod inspect;
 pub mod json_file;
 mod litter;
 mod parquet_file;
-mod proto;
 pub mod peek;
+mod proto;
 pub mod provenance;
 pub mod recording;
 pub mod seal;
@@ -18,7 +18,7 @@ pub mod table_file;
 pub mod weights;
 
 pub use inspect::{inspect, inspect_text};
-pub use provenance::{Provenance, hash_path};
+pub use provenance::{ContentHash, Provenance};
 
 use crate::error::{Error, Result};
 use crate::interrupt;

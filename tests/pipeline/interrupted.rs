@@ -169,7 +169,12 @@ fn a_signal_ends_a_process_that_waits_for_its_input() {
     let over = |stage: &str, name: &str| -> Vec<String> {
         run.words(stage).into_iter().map(|w| if w == run.name(name) { pipe.clone() } else { w }).collect()
     };
-    for words in [over("simulate", "plans.parquet"), over("evaluate", "policy.safetensors"), over("train", "dynamics.safetensors"), vec!["settings".into(), "--pipeline".into(), pipe.clone()]] {
+    for words in [
+        over("simulate", "plans.parquet"),
+        over("evaluate", "policy.safetensors"),
+        over("train", "dynamics.safetensors"),
+        vec!["settings".into(), "--pipeline".into(), pipe.clone()],
+    ] {
         let what = format!("{words:?}");
         let mut child = start(words);
         std::thread::sleep(SOON);

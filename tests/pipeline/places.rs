@@ -212,8 +212,10 @@ fn a_mount_point_is_filled_or_refused_before_the_work() {
     let before = contents(&run.at("recordings"));
     let script = "mkdir \"$0\"; mount -t tmpfs tmpfs \"$0\" || exit 77; \"$@\" || exit; ls -A \"$0\"; \"$@\"; echo \"code $?\"";
     let mount = run.name("mount");
-    let output =
-        Command::new("unshare").args(["-rm", "bash", "-c", script, &mount, HILT]).args(with(&run, "simulate", "--out", &mount)).output();
+    let output = Command::new("unshare")
+        .args(["-rm", "bash", "-c", script, &mount, HILT])
+        .args(with(&run, "simulate", "--out", &mount))
+        .output();
     let output = match output {
         Ok(output) if output.status.code() != Some(77) && !text(&output.stderr).contains("unshare") => output,
         _ => return println!("skipped: mounting is not permitted here"),
@@ -227,7 +229,13 @@ fn a_mount_point_is_filled_or_refused_before_the_work() {
 fn what_a_killed_process_left_is_removed_by_the_next() {
     let run = Run::finished();
     let before = contents(run.path());
-    let leftovers = || fs::read_dir(run.path()).expect("readable").flatten().filter(|e| e.file_name().to_string_lossy().starts_with(".hilt-")).count();
+    let leftovers = || {
+        fs::read_dir(run.path())
+            .expect("readable")
+            .flatten()
+            .filter(|e| e.file_name().to_string_lossy().starts_with(".hilt-"))
+            .count()
+    };
     let words = with(&run, "evaluate", "--record", &run.name("rollouts"));
     let mut killed = Command::new(HILT).args(words).args(["--episodes", "5000", "--quiet"]).spawn().expect("the binary runs");
     while leftovers() == 0 {
@@ -242,4 +250,23 @@ fn what_a_killed_process_left_is_removed_by_the_next() {
     assert_eq!(leftovers(), 1, "a killed process cannot clean up");
     done(&hilt(run.words("plan")));
     run.unchanged("the next stage", &before);
+}
+
+#[test]
+fn provenance_names_the_bytes_that_were_read() {
+    let run = Run::finished();
+    let read = fs::read(run.at("policy.safetensors")).expect("weights");
+    let child = Command::new(HILT)
+        .args(run.words("evaluate"))
+        .args(["--episodes", "3000", "--quiet"])
+        .stdout(std::process::Stdio::null())
+        .spawn();
+    std::thread::sleep(std::time::Duration::from_millis(300));
+    let mut other = run.words("train");
+    other.extend(words(&["--method", "bc"]));
+    done(&hilt(other));
+    assert!(read != fs::read(run.at("policy.safetensors")).expect("weights"), "the policy was replaced in between");
+    assert!(child.expect("the binary runs").wait().expect("ended").success());
+    let (_, origin) = hilt::data::json_file::read(&run.at("evaluation.json")).expect("a summary");
+    assert_eq!(origin.inputs["policy"], hilt::data::ContentHash::of(&read).to_string());
 }

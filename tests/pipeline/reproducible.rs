@@ -59,7 +59,13 @@ fn another_seed_gives_other_content() {
     let (one, two) = (whole("pick-up", 3, "2"), whole("pick-up", 4, "2"));
     // Beyond the seed that the provenance names.
     let tables = |run: &Run, name: &str| table_file::read(&run.at(name)).expect("a table").0;
-    for name in ["plans.parquet", "dynamics.pretraining.parquet", "dynamics.errors.parquet", "policy.training.parquet", "evaluation.episodes.parquet"] {
+    for name in [
+        "plans.parquet",
+        "dynamics.pretraining.parquet",
+        "dynamics.errors.parquet",
+        "policy.training.parquet",
+        "evaluation.episodes.parquet",
+    ] {
         assert_ne!(tables(&one, name), tables(&two, name), "{name}");
     }
     let episode = |run: &Run| recording::read(&run.at("recordings/episode-00000.mcap")).expect("a recording").0;

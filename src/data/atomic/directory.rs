@@ -23,7 +23,8 @@ pub fn write_dir(path: &Path, ours: impl Fn(&Path) -> bool, fill: impl FnOnce(&P
     let fresh = temporary::directory(parent, path)?;
     fill(fresh.dir.path()).map_err(|e| in_words_of(e, fresh.dir.path(), path))?;
     sync_all_below(fresh.dir.path()).map_err(|e| Error::io(path, "write", e))?;
-    if place.in_place { move_in(fresh, &place.path) } else { exchange(fresh, &place) }.map_err(|e| Error::io(path, "rename", e))?;
+    if place.in_place { move_in(fresh, &place.path) } else { exchange(fresh, &place) }
+        .map_err(|e| Error::io(path, "rename", e))?;
     sync_directory(parent);
     Ok(())
 }
@@ -79,7 +80,9 @@ pub(super) fn check_directory(path: &Path, ours: impl Fn(&Path) -> bool) -> Resu
     match fixed {
         Some(what) if !empty => Err(Error::input(
             path,
-            format!("is {what} and not empty, so its content cannot be exchanged in one step; empty it, or name a directory inside it"),
+            format!(
+                "is {what} and not empty, so its content cannot be exchanged in one step; empty it, or name a directory inside it"
+            ),
         )),
         _ => Ok(Place { path: place, exists: true, in_place: fixed.is_some(), kept }),
     }

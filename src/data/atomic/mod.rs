@@ -92,8 +92,12 @@ fn write_into(place: &Path, bytes: &[u8]) -> std::io::Result<()> {
     let open = |flags: OFlags| File::options().write(true).custom_flags(flags.bits().cast_signed()).open(place);
     let probe = loop {
         match open(OFlags::NONBLOCK) {
-            Err(e) if e.raw_os_error() == Some(Errno::NXIO.raw_os_error()) && began.elapsed() < READER_PATIENCE => sleep(READER_TICK),
-            Err(e) if e.raw_os_error() == Some(Errno::NXIO.raw_os_error()) => return Err(std::io::Error::other("nobody reads this pipe")),
+            Err(e) if e.raw_os_error() == Some(Errno::NXIO.raw_os_error()) && began.elapsed() < READER_PATIENCE => {
+                sleep(READER_TICK)
+            }
+            Err(e) if e.raw_os_error() == Some(Errno::NXIO.raw_os_error()) => {
+                return Err(std::io::Error::other("nobody reads this pipe"));
+            }
             other => break other?,
         }
     };

@@ -43,7 +43,10 @@ pub fn target(path: &Path) -> Result<Target> {
         return Ok(Target::Stream(place));
     }
     if !kind.is_file() {
-        return Err(Error::input(path, "is a socket or a disk, hilt writes to files, pipes and character devices; choose another name"));
+        return Err(Error::input(
+            path,
+            "is a socket or a disk, hilt writes to files, pipes and character devices; choose another name",
+        ));
     }
     Ok(Target::File(place))
 }

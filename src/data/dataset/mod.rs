@@ -88,18 +88,14 @@ pub fn write_split(
     interrupt: &Interrupt,
 ) -> Result<()> {
     let content = Content { task, provenance, file_bytes: DATA_FILE_BYTES, interrupt };
-    atomic::write_dir(
-        parent,
-        is_file,
-        |dir| {
-            for (name, episodes) in [(TRAIN, train), (VALIDATION, validation)] {
-                if name == TRAIN || !episodes.is_empty() {
-                    content.fill(&dir.join(name), episodes)?;
-                }
+    atomic::write_dir(parent, is_file, |dir| {
+        for (name, episodes) in [(TRAIN, train), (VALIDATION, validation)] {
+            if name == TRAIN || !episodes.is_empty() {
+                content.fill(&dir.join(name), episodes)?;
             }
-            Ok(())
-        },
-    )
+        }
+        Ok(())
+    })
 }
 
 /// Whether a path below the two datasets is one of theirs.

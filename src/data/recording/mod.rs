@@ -17,7 +17,7 @@ mod foxglove;
 
 pub use foxglove::{BASE_FRAME, BLOCK_FRAME, WORLD_FRAME};
 
-use super::{Provenance, atomic, proto, provenance, read_bytes, seal};
+use super::{ContentHash, Provenance, atomic, proto, provenance, read_bytes, seal};
 use crate::demo::Episode;
 use crate::error::{Error, Result};
 use crate::robot::Arm;
@@ -103,16 +103,28 @@ pub fn encode(path: &Path, episode: &Episode, urdf: &str, provenance: &Provenanc
 /// [`Error::Input`] when the file is cut short, damaged, foreign or of another schema version, [`Error::Io`] when it cannot be read
 /// at all.
 pub fn read(path: &Path) -> Result<(Episode, Provenance)> {
+    decode(path, &read_bytes(path)?)
+}
+
+/// As [`read`], with the hash of the bytes that were read.
+///
+/// # Errors
+/// As [`read`].
+pub fn read_hashed(path: &Path) -> Result<(Episode, Provenance, ContentHash)> {
     let bytes = read_bytes(path)?;
+    decode(path, &bytes).map(|(episode, provenance)| (episode, provenance, ContentHash::of(&bytes)))
+}
+
+fn decode(path: &Path, bytes: &[u8]) -> Result<(Episode, Provenance)> {
     if !bytes.starts_with(mcap::MAGIC) {
         return Err(Error::input(path, "is not an MCAP file; expected a recording of hilt simulate"));
     }
     if !bytes.ends_with(mcap::MAGIC) {
         return Err(Error::input(path, "is an MCAP file without its end: it is cut short; run hilt simulate again"));
     }
-    seal::check(path, &bytes)?;
-    let provenance = read_provenance(path, &bytes)?;
-    let episode = decode::episode(&bytes).map_err(|message| Error::input(path, message))?;
+    seal::check(path, bytes)?;
+    let provenance = read_provenance(path, bytes)?;
+    let episode = decode::episode(bytes).map_err(|message| Error::input(path, message))?;
     Ok((episode, provenance))
 }
 
