@@ -256,7 +256,7 @@ fn an_interrupt_ends_a_search_within_a_second() {
     let raise = interrupt.clone();
     let raised = std::thread::spawn(move || {
         std::thread::sleep(std::time::Duration::from_millis(300));
-        raise.raise();
+        raise.raise(2);
         std::time::Instant::now()
     });
     assert!(plan(&mut planner, &scene, 0).is_err(), "there is no way through");

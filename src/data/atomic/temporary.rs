@@ -5,9 +5,11 @@
 //! lock its directory is locked, shared by those who create and alone by those who remove. On a file system without such locks nothing is removed.
 
 use crate::error::{Error, Result};
-use std::fs::{self, File, Permissions};
+use std::fs::{self, File, Permissions, TryLockError};
 use std::os::unix::fs::PermissionsExt;
 use std::path::Path;
+use std::thread::sleep;
+use std::time::Duration;
 use tempfile::{NamedTempFile, TempDir};
 
 /// Temporary names are this, some letters, and [`SUFFIX`].
@@ -15,6 +17,9 @@ const PREFIX: &str = ".hilt-";
 const SUFFIX: &str = ".new";
 /// Letters and digits between the two.
 const LETTERS: usize = 6;
+/// How often a directory's lock is asked for, and the time in between: removing what is left takes a moment.
+const TRIES: usize = 20;
+const PAUSE: Duration = Duration::from_millis(1);
 /// Mode of files before the umask (0644 under the usual one), instead of a temporary file's 0600.
 const FILE_MODE: u32 = 0o666;
 /// Mode of directories before the umask.
@@ -68,8 +73,18 @@ pub(super) fn sweep(dir: &Path) {
     }
 }
 
+/// The lock of a directory in which something is created. It is not waited for long: a directory that is being filled is locked by
+/// the process that fills it, and nobody removes anything in there.
 fn lock_shared(dir: &Path) -> Option<File> {
-    File::open(dir).ok().filter(|handle| handle.lock_shared().is_ok())
+    let handle = File::open(dir).ok()?;
+    for _ in 0..TRIES {
+        match handle.try_lock_shared() {
+            Ok(()) => return Some(handle),
+            Err(TryLockError::WouldBlock) => sleep(PAUSE),
+            Err(TryLockError::Error(_)) => return None,
+        }
+    }
+    None
 }
 
 fn builder(mode: u32) -> tempfile::Builder<'static, 'static> {
