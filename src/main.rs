@@ -18,6 +18,9 @@ const INTERRUPTS: [i32; 2] = [SIGINT, SIGTERM];
 
 fn main() -> ExitCode {
     let cli = Cli::parse();
+    if let Err(e) = hilt::nn::kernel::choose() {
+        return fail(&e.to_string(), e.exit_code());
+    }
     let interrupt = Interrupt::default();
     if let Err(e) = listen(&interrupt) {
         return fail(&format!("cannot listen for signals: {e}"), 1);
