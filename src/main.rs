@@ -30,6 +30,9 @@ const TICK: Duration = Duration::from_millis(20);
 
 fn main() -> ExitCode {
     let cli = Cli::parse();
+    if let Err(e) = hilt::nn::kernel::choose() {
+        return fail(&e.to_string(), e.exit_code(None));
+    }
     let interrupt = Interrupt::default();
     if let Err(e) = listen(interrupt.clone()) {
         return fail(&format!("cannot listen for signals: {e}"), 1);

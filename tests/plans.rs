@@ -5,6 +5,7 @@ mod plan_oracle;
 use hilt::config::{PlanSettings, SceneSettings};
 use hilt::demo::Phase;
 use hilt::interrupt::Interrupt;
+use hilt::math::{acos, cos};
 use hilt::plan::{
     CLEARANCE_M, GRASP_OVER_CENTER_M, LIFTED_CENTER_M, Limits, Plan, PlanError, Planner, RELEASE_GAP_M, check_ready_pose,
     from_table, to_table,
@@ -95,7 +96,7 @@ fn check_hand(plan: &Plan) {
         |phase: Phase| plan.waypoints.iter().rev().find(|w| w.phase == phase).map(|w| arm.tool_pose(&w.q_rad).translation.vector);
     for w in &plan.waypoints {
         let up = arm.tool_pose(&w.q_rad).rotation * nalgebra::Vector3::z();
-        assert!(up.z > LEVEL_RAD.cos(), "hand tilted by {} rad in {}", up.z.acos(), w.phase.name());
+        assert!(up.z > cos(LEVEL_RAD), "hand tilted by {} rad in {}", acos(up.z), w.phase.name());
     }
     let near = |at: nalgebra::Vector3<f64>, [x, y, z]: [f64; 3]| {
         assert!((at - nalgebra::Vector3::new(x, y, z)).norm() < IN_PLACE_M, "{at} for {x} {y} {z}")

@@ -13,6 +13,7 @@ use super::state_cloning::{self as sc, Segment, draw_segments};
 use crate::config::{ActionChoice, TrainSettings};
 use crate::demo::Demo;
 use crate::error::{Error, Result};
+use crate::math::ln;
 use crate::nn::{Adam, Ema, clip_by_global_norm, gaussian, global_norm};
 use crate::seed::stream;
 use crate::state::JOINTS;
@@ -258,7 +259,7 @@ impl Learner {
         self.net_descent.adam.step(&mut self.policy.net.params_mut(), &self.gradient, learning_rate);
         self.net_descent.ema.update(self.policy.net.params());
         self.std_descent.adam.step(&mut self.policy.log_std, &d_log_std, learning_rate);
-        gaussian::floor_log_std(&mut self.policy.log_std, self.settings.std_floor.ln() as f32);
+        gaussian::floor_log_std(&mut self.policy.log_std, ln(self.settings.std_floor) as f32);
         self.std_descent.ema.update(&self.policy.log_std);
     }
 

@@ -4,6 +4,7 @@ use super::corpus::{Corpus, row};
 use super::dynamics::{DT_S, Dynamics};
 use crate::error::Result;
 use crate::interrupt::Interrupt;
+use crate::math::acos;
 use crate::nn::{LANES, Panels, Pass};
 use crate::state::{ARM_JOINTS, BASE_DIM, JOINTS};
 use crate::table::{Table, Values};
@@ -127,7 +128,7 @@ fn square_error(state: &[f32], truth: &[f32], (name, _, entries): &(&str, &str, 
         "block_rotation" => {
             let dot = |f: fn((f64, f64)) -> f64| pairs().map(f).sum::<f64>();
             let cos = dot(|(a, b)| a * b).abs() / (dot(|(a, _)| a * a) * dot(|(_, b)| b * b)).sqrt();
-            (2.0 * cos.min(1.0).acos()).powi(2)
+            (2.0 * acos(cos.min(1.0))).powi(2)
         }
         _ => sum / entries.len() as f64,
     }

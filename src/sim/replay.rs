@@ -53,6 +53,7 @@ pub fn reexecute(
 mod tests {
     use super::*;
     use crate::config::PulseSettings;
+    use crate::math::sin_cos;
     use crate::scene::Obstacle;
     use crate::seed::stream;
     use crate::sim::World;
@@ -64,7 +65,8 @@ mod tests {
         let scene = draw_scene(Task::Stack, &settings, &mut stream(3, "scene", 0)).expect("there is room");
         let mut world = World::new(&scene);
         let mut states = world.observe().state.to_row();
-        let actions: Vec<f32> = (0..15).flat_map(|t| (0..JOINTS).map(move |i| 0.2 * ((t + i) as f32 / 3.0).sin())).collect();
+        let actions: Vec<f32> =
+            (0..15).flat_map(|t| (0..JOINTS).map(move |i| 0.2 * sin_cos((t + i) as f64 / 3.0).0 as f32)).collect();
         for action in actions.chunks_exact(JOINTS) {
             world.step(&std::array::from_fn(|i| f64::from(action[i])));
             states.extend(world.observe().state.to_row());
