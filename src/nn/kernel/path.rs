@@ -93,7 +93,7 @@ mod tests {
         }
         for name in ["", "AVX2", "sse9"] {
             let error = Path::named(OsStr::new(name)).expect_err("no kernel");
-            assert_eq!(error.exit_code(), 2);
+            assert_eq!(error.exit_code(None), 2);
             assert!(error.to_string().contains("allowed: ") && error.to_string().contains("portable"), "{error}");
         }
     }
