@@ -4,6 +4,8 @@
 //! carries a seal over its own bytes ([`seal`]), so that a damaged file is refused before any decoder reads it.
 
 pub mod atomic;
+mod budget;
+mod bytes;
 pub mod dataset;
 mod inspect;
 pub mod json_file;

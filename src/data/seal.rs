@@ -3,6 +3,7 @@
 
 use super::provenance::SCHEMA_VERSION;
 use crate::error::{Error, Result};
+use std::ops::Range;
 use std::path::Path;
 
 /// What stands before the 64 hexadecimal digits.
@@ -17,12 +18,13 @@ pub fn blank() -> String {
     MARK.to_string() + &"0".repeat(DIGITS)
 }
 
-/// Fills in the last [`blank`] of `bytes`.
+/// Fills in the last seal of `bytes`, blank or not.
 ///
 /// # Panics
 /// If `bytes` hold no seal: a writer that forgot it.
 pub fn close(mut bytes: Vec<u8>) -> Vec<u8> {
     let at = digits_at(&bytes).expect("the writer put a blank seal into the file");
+    bytes[at..at + DIGITS].fill(b'0');
     let hash = blake3::hash(&bytes).to_hex();
     bytes[at..at + DIGITS].copy_from_slice(hash.as_bytes());
     bytes
@@ -34,22 +36,36 @@ pub fn close(mut bytes: Vec<u8>) -> Vec<u8> {
 /// [`Error::Input`] when there is none (another program wrote the file, or its end is missing), when the file was written by a
 /// version of hilt with another schema, or when a byte differs.
 pub fn check(path: &Path, bytes: &[u8]) -> Result<()> {
+    check_but(path, bytes, 0..0)
+}
+
+/// As [`check`], of a file in which the seal took the bytes of `later`, behind it, for zeros: they were filled in after it.
+///
+/// # Errors
+/// As [`check`].
+pub(super) fn check_but(path: &Path, bytes: &[u8], later: Range<usize>) -> Result<()> {
     let Some(at) = digits_at(bytes) else {
         return Err(Error::input(
             path,
             "no hilt seal found: the file is cut short or another program wrote it; run the stage that makes it again",
         ));
     };
+    let digits = at..at + DIGITS;
     let mut hash = blake3::Hasher::new();
-    hash.update(&bytes[..at]).update("0".repeat(DIGITS).as_bytes()).update(&bytes[at + DIGITS..]);
-    if bytes[at..at + DIGITS] == *hash.finalize().to_hex().as_bytes() {
+    hash.update(&bytes[..at]).update("0".repeat(DIGITS).as_bytes());
+    match bytes.get(digits.end..later.start) {
+        Some(between) => hash.update(between).update(&vec![0; later.len()]).update(&bytes[later.end..]),
+        None => hash.update(&bytes[digits.end..]),
+    };
+    if bytes[digits] == *hash.finalize().to_hex().as_bytes() {
         return Ok(());
     }
     match foreign_version(bytes) {
         Some(version) => Err(wrong_version(path, version)),
         None => Err(Error::input(
             path,
-            "damaged: its content does not match its seal (a changed, missing or added byte); run the stage that makes it again",
+            "damaged, or rewritten by another program: its content does not match its seal (a changed, missing or added byte); run \
+             the stage that makes it again",
         )),
     }
 }

@@ -6,21 +6,21 @@ use crate::demo::{Contacts, Episode, Phase, Step};
 use crate::scene::{Obstacle, Scene};
 use crate::state::{Context, Pose, State};
 use crate::tasks::{FailureClass, Task};
-use mcap::MessageStream;
+use super::walk::Outline;
 use prost::Message;
 
 /// The episode in a whole file.
-pub(super) fn episode(bytes: &[u8]) -> Result<Episode, String> {
+pub(super) fn episode(outline: &Outline) -> Result<Episode, String> {
     let (mut found_scene, mut found_outcome, mut steps) = (None, None, Vec::new());
-    for message in MessageStream::new(bytes).map_err(|e| format!("cannot be decoded: {e}"))? {
-        let message = message.map_err(|e| format!("cannot be decoded: {e}"))?;
-        match message.channel.topic.as_str() {
-            SCENE_TOPIC => found_scene = Some(scene(parse(SCENE_TOPIC, &message.data)?)?),
-            STEP_TOPIC => steps.push(parse::<proto::Step>(STEP_TOPIC, &message.data)?),
-            OUTCOME_TOPIC => found_outcome = Some(parse::<proto::Outcome>(OUTCOME_TOPIC, &message.data)?),
+    outline.messages(&mut |topic, data| {
+        match topic {
+            SCENE_TOPIC => found_scene = Some(scene(parse(SCENE_TOPIC, data)?)?),
+            STEP_TOPIC => steps.push(parse::<proto::Step>(STEP_TOPIC, data)?),
+            OUTCOME_TOPIC => found_outcome = Some(parse::<proto::Outcome>(OUTCOME_TOPIC, data)?),
             _ => {}
         }
-    }
+        Ok(())
+    })?;
     let scene = found_scene.ok_or_else(|| missing(SCENE_TOPIC))?;
     let outcome = found_outcome.ok_or_else(|| missing(OUTCOME_TOPIC))?;
     let count = steps.len() as u64;

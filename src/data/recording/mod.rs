@@ -9,15 +9,21 @@
 //! | `/hilt/step` | hilt.Step | every control step, then the final state |
 //! | `/hilt/outcome` | hilt.Outcome | success or failure class: once, at the end |
 //!
-//! The URDF is attached as `robot.urdf`; the metadata record `hilt` holds provenance and seal. Times are simulated, from 0.
+//! The URDF is attached as `robot.urdf`; the metadata record `hilt` holds provenance and seal. Times are simulated, from 0. MCAP's own
+//! checksums hold as well: the one of the data section is computed last and covers the seal, which takes its place for zeros.
 
 mod decode;
 mod encode;
+mod fields;
 mod foxglove;
+mod records;
+mod walk;
 
 pub use foxglove::{BASE_FRAME, BLOCK_FRAME, WORLD_FRAME};
 
-use super::{ContentHash, Provenance, atomic, proto, provenance, read_bytes, seal};
+use super::{ContentHash, Provenance, atomic, proto, provenance, seal};
+use crate::guard::guarded;
+use super::bytes::{Ends, Format};
 use crate::demo::Episode;
 use crate::error::{Error, Result};
 use crate::robot::Arm;
@@ -30,7 +36,10 @@ use prost::Message;
 use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::io::Cursor;
+use fields::Fields;
+use records::{Sections, op};
 use std::path::{Path, PathBuf};
+use walk::Outline;
 
 /// Duration of a control step on the clock of the file \[ns\].
 const STEP_NS: u64 = 1_000_000_000 / CONTROL_HZ as u64;
@@ -94,7 +103,63 @@ pub fn encode(path: &Path, episode: &Episode, urdf: &str, provenance: &Provenanc
         return Err(Error::input(path, message));
     }
     let bytes = to_mcap(episode, urdf, provenance).map_err(|e| Error::input(path, format!("cannot be encoded as MCAP: {e}")))?;
-    Ok(seal::close(bytes))
+    Ok(close(bytes))
+}
+
+/// Fills in the seal and, last, the checksum of the data section, which covers it.
+///
+/// # Panics
+/// If `bytes` are no whole MCAP file with a seal.
+pub fn close(mut bytes: Vec<u8>) -> Vec<u8> {
+    let sections = Sections::of(&bytes).expect("the writer finished the file");
+    bytes[sections.data_crc()].fill(0);
+    let mut bytes = seal::close(bytes);
+    let crc = crc32fast::hash(&bytes[..sections.data_end]);
+    bytes[sections.data_crc()].copy_from_slice(&crc.to_le_bytes());
+    bytes
+}
+
+/// What a recording looks like from outside.
+const FORMAT: Format = Format {
+    most_bytes: 128 << 20,
+    reason: "a recording of 20,000 steps, the most there can be, has some 30 MB",
+    head: check_head,
+    ends: check_ends,
+};
+/// The library's name that hilt notes in the header, before its version.
+const LIBRARY: &str = "hilt ";
+
+fn check_head(path: &Path, head: &[u8]) -> Result<()> {
+    if !head.starts_with(mcap::MAGIC) {
+        return Err(Error::input(path, "is not an MCAP file; expected a recording of hilt simulate"));
+    }
+    Ok(())
+}
+
+fn check_ends(path: &Path, ends: &Ends) -> Result<()> {
+    if *ends.tail(path, mcap::MAGIC.len())? != *mcap::MAGIC {
+        return Err(Error::input(path, "is an MCAP file without its end: it is cut short; run hilt simulate again"));
+    }
+    let head = ends.at(path, mcap::MAGIC.len() as u64, super::bytes::HEAD_BYTES)?;
+    match library(&head) {
+        Ok(library) if library.starts_with(LIBRARY) => Ok(()),
+        Ok(other) => Err(Error::input(
+            path,
+            format!("is an MCAP file that another program wrote or rewrote (\"{other}\"); hilt reads its own: run hilt simulate again"),
+        )),
+        Err(why) => Err(Error::input(path, format!("is an MCAP file without a header ({why}); run hilt simulate again"))),
+    }
+}
+
+/// The program that a header names.
+fn library(head: &[u8]) -> std::result::Result<String, String> {
+    let mut fields = Fields(head);
+    if fields.u8()? != op::HEADER {
+        return Err("its first record is another".into());
+    }
+    let mut content = Fields(fields.bytes64()?);
+    let (_profile, library) = (content.text()?, content.text()?);
+    Ok(library.into())
 }
 
 /// Reads an episode, exactly as it was written.
@@ -103,7 +168,7 @@ pub fn encode(path: &Path, episode: &Episode, urdf: &str, provenance: &Provenanc
 /// [`Error::Input`] when the file is cut short, damaged, foreign or of another schema version, [`Error::Io`] when it cannot be read
 /// at all.
 pub fn read(path: &Path) -> Result<(Episode, Provenance)> {
-    decode(path, &read_bytes(path)?)
+    decode(path, &FORMAT.read(path)?)
 }
 
 /// As [`read`], with the hash of the bytes that were read.
@@ -111,35 +176,33 @@ pub fn read(path: &Path) -> Result<(Episode, Provenance)> {
 /// # Errors
 /// As [`read`].
 pub fn read_hashed(path: &Path) -> Result<(Episode, Provenance, ContentHash)> {
-    let bytes = read_bytes(path)?;
+    let bytes = FORMAT.read(path)?;
     decode(path, &bytes).map(|(episode, provenance)| (episode, provenance, ContentHash::of(&bytes)))
 }
 
-fn decode(path: &Path, bytes: &[u8]) -> Result<(Episode, Provenance)> {
-    if !bytes.starts_with(mcap::MAGIC) {
-        return Err(Error::input(path, "is not an MCAP file; expected a recording of hilt simulate"));
-    }
-    if !bytes.ends_with(mcap::MAGIC) {
-        return Err(Error::input(path, "is an MCAP file without its end: it is cut short; run hilt simulate again"));
-    }
-    seal::check(path, bytes)?;
-    let provenance = read_provenance(path, bytes)?;
-    let episode = decode::episode(bytes).map_err(|message| Error::input(path, message))?;
-    Ok((episode, provenance))
-}
-
-fn read_provenance(path: &Path, bytes: &[u8]) -> Result<Provenance> {
-    let broken = |e: mcap::McapError| Error::input(path, format!("cannot be decoded: {e}"));
-    let summary = mcap::Summary::read(bytes).map_err(broken)?.unwrap_or_default();
-    let index = summary.metadata_indexes.iter().find(|m| m.name == provenance::KEY);
-    let index = index.ok_or_else(|| Error::input(path, "was not written by hilt: it has no metadata record \"hilt\""))?;
-    let record = mcap::read::metadata(bytes, index).map_err(broken)?;
-    let json = record.metadata.get(PROVENANCE).map_or("", String::as_str);
-    Provenance::from_json(path, json)
+/// The episode in the bytes of the file at `path`.
+///
+/// # Errors
+/// [`Error::Input`] as [`read`].
+pub fn decode(path: &Path, bytes: &[u8]) -> Result<(Episode, Provenance)> {
+    FORMAT.check(path, bytes)?;
+    let damaged = |why: String| Error::input(path, format!("damaged: {why}; run hilt simulate again"));
+    let sections = Sections::of(bytes).map_err(damaged)?;
+    seal::check_but(path, bytes, sections.data_crc())?;
+    sections.check_crcs(bytes).map_err(damaged)?;
+    let decoded = guarded(|| {
+        let outline = Outline::of(bytes, &sections).map_err(damaged)?;
+        let entries = outline.metadata.get(provenance::KEY);
+        let entries = entries.ok_or_else(|| Error::input(path, "was not written by hilt: it has no metadata record \"hilt\""))?;
+        let provenance = Provenance::from_json(path, entries.get(PROVENANCE).unwrap_or(&""))?;
+        let episode = decode::episode(&outline).map_err(|message| Error::input(path, message))?;
+        Ok((episode, provenance))
+    });
+    decoded.unwrap_or_else(|why| Err(damaged(why)))
 }
 
 fn to_mcap(episode: &Episode, urdf: &str, provenance: &Provenance) -> McapResult<Vec<u8>> {
-    // Without the checksum of the whole data section, which would cover the seal; chunks keep theirs.
+    // The checksum of the whole data section covers the seal: `close` fills in both.
     let options = WriteOptions::new()
         .compression(Some(mcap::Compression::Zstd))
         .compression_threads(0)
