@@ -17,7 +17,7 @@ pub use choices::{
 pub use data::{ConvertSettings, EvaluateSettings};
 pub use load::{Preset, Source};
 pub use pretrain::PretrainSettings;
-pub use ranges::MOST_STEPS;
+pub use ranges::{MOST_LAYERS, MOST_STEPS, MOST_UNITS};
 pub use scene::{PlanSettings, PulseSettings, SceneSettings, SimulateSettings, Spread};
 pub use train::TrainSettings;
 

@@ -37,6 +37,10 @@ const MOST_EPISODES: f64 = 100_000.0;
 /// Most control steps of an episode, and samples of a plan: 500 s. Keeps a slip of the finger from allocating all memory.
 pub const MOST_STEPS: u32 = 10_000;
 const STEPS: f64 = MOST_STEPS as f64;
+/// Most hidden layers of a network.
+pub const MOST_LAYERS: u32 = 16;
+/// Most units of a hidden layer.
+pub const MOST_UNITS: u32 = 4096;
 /// Nodes of a search: the trees of so many fill the workspace, and finding the nearest among them takes seconds.
 const MOST_ITERATIONS: f64 = 100_000.0;
 /// Kilograms of the lightest block: a cube of foam. In the simulator's single precision a far lighter one vanishes beside the arm.
@@ -77,8 +81,8 @@ pub(super) const RANGES: &[Range] = &[
     within("convert.demos", 0.0, MOST_EPISODES),
     within("evaluate.episodes", 1.0, MOST_EPISODES),
     within("evaluate.horizon_steps", 0.0, STEPS),
-    within("pretrain.hidden_layers", 1.0, 16.0),
-    within("pretrain.hidden_units", 1.0, 4096.0),
+    within("pretrain.hidden_layers", 1.0, MOST_LAYERS as f64),
+    within("pretrain.hidden_units", 1.0, MOST_UNITS as f64),
     within("pretrain.steps", 1.0, 100.0),
     within("pretrain.ensemble", 1.0, 100.0),
     within("pretrain.reexecute", 0.0, 1000.0),
@@ -91,8 +95,8 @@ pub(super) const RANGES: &[Range] = &[
     above("pretrain.final_learning_rate", 0.0, SINGLE),
     within("pretrain.clip_norm", 0.0, SINGLE),
     below("pretrain.ema_decay", 0.0, 1.0),
-    within("train.hidden_layers", 1.0, 16.0),
-    within("train.hidden_units", 1.0, 4096.0),
+    within("train.hidden_layers", 1.0, MOST_LAYERS as f64),
+    within("train.hidden_units", 1.0, MOST_UNITS as f64),
     within("train.initial_std", SCALE[0], SCALE[1]),
     within("train.std_floor", SCALE[0], SCALE[1]),
     within("train.tau", SCALE[0], SCALE[1]),

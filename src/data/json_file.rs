@@ -1,7 +1,9 @@
 //! Summaries as JSON: keys sorted, indented, with provenance and seal under the key `hilt`.
 
-use super::{Provenance, atomic, provenance, read_bytes, seal};
+use super::bytes::{Ends, Format};
+use super::{Provenance, atomic, json_text, provenance, seal};
 use crate::error::{Error, Result};
+use crate::guard::guarded;
 use serde_json::{Map, Value, json};
 use std::path::Path;
 
@@ -28,17 +30,52 @@ pub fn encode(path: &Path, content: &Value, provenance: &Provenance) -> Result<V
     Ok(seal::close(text.into_bytes()))
 }
 
+/// What a summary looks like from outside.
+const FORMAT: Format = Format {
+    most_bytes: 64 << 20,
+    reason: "a summary of 100,000 episodes has less than 1 MB",
+    head: check_head,
+    ends: check_ends,
+};
+/// More blanks at an end than any program writes.
+const END_BYTES: usize = 64;
+
+fn check_head(path: &Path, head: &[u8]) -> Result<()> {
+    match head.trim_ascii_start().first() {
+        Some(b'{') => Ok(()),
+        _ => Err(Error::input(path, "is no JSON object; expected a summary of hilt evaluate")),
+    }
+}
+
+fn check_ends(path: &Path, ends: &Ends) -> Result<()> {
+    if !ends.tail(path, END_BYTES)?.trim_ascii_end().ends_with(b"}") {
+        return Err(Error::input(path, "is a JSON object without its end: it is cut short; run the stage that makes it again"));
+    }
+    Ok(())
+}
+
 /// Reads what [`write()`] wrote, without the key `hilt`.
 ///
 /// # Errors
 /// [`Error::Input`] when the file is no such JSON, is of another schema version or was changed.
 pub fn read(path: &Path) -> Result<(Value, Provenance)> {
-    let bytes = read_bytes(path)?;
-    let mut fields: Map<String, Value> =
-        serde_json::from_slice(&bytes).map_err(|e| Error::input(path, format!("is no JSON object: {e}")))?;
-    let provenance = provenance_of(path, fields.remove(provenance::KEY))?;
-    seal::check(path, &bytes)?;
-    Ok((Value::Object(fields), provenance))
+    decode(path, &FORMAT.read(path)?)
+}
+
+/// The summary in the bytes of the file at `path`.
+///
+/// # Errors
+/// [`Error::Input`] as [`read`].
+pub fn decode(path: &Path, bytes: &[u8]) -> Result<(Value, Provenance)> {
+    FORMAT.check(path, bytes)?;
+    seal::check(path, bytes)?;
+    let decoded = guarded(|| {
+        let fields = json_text::parse(bytes);
+        let mut fields: Map<String, Value> = fields.map_err(|why| Error::input(path, format!("is no JSON object: {why}")))?;
+        let provenance = provenance_of(path, fields.remove(provenance::KEY))?;
+        Ok((Value::Object(fields), provenance))
+    });
+    decoded.unwrap_or_else(|why| Err(Error::input(path, format!("damaged: {why}"))))
 }
 
 /// The provenance within the value of the key `hilt`.

@@ -9,6 +9,7 @@ mod bytes;
 pub mod dataset;
 mod inspect;
 pub mod json_file;
+mod json_text;
 mod litter;
 mod parquet_file;
 pub mod peek;

@@ -75,7 +75,8 @@ pub fn peek(path: &Path) -> Result<Peeked> {
     })
 }
 
-fn format_of(head: &[u8]) -> Format {
+/// The format that a file's first bytes are of.
+pub(super) fn format_of(head: &[u8]) -> Format {
     match head {
         [] => Format::Empty,
         [b'P', b'A', b'R', b'1', ..] => Format::Parquet,

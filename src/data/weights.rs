@@ -1,14 +1,17 @@
 //! Network weights as safetensors. The header's only metadata key, `hilt`, holds JSON: kind, what is needed to run the network,
 //! the tensors' order, provenance and seal.
 
-use super::{ContentHash, Provenance, atomic, provenance, read_bytes, seal};
+use super::bytes::{Ends, Format};
+use super::{ContentHash, Provenance, atomic, json_text, provenance, seal};
 use crate::error::{Error, Result};
+use crate::guard::guarded;
 use crate::tensor::NamedTensor;
+use crate::words::shown;
 use safetensors::SafeTensors;
-use safetensors::tensor::{Dtype, TensorView};
+use safetensors::tensor::{Dtype, Metadata, TensorView};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
-use std::collections::HashMap;
+use std::collections::{BTreeSet, HashMap};
 use std::path::Path;
 
 /// The kind of a checkpoint of training; every other kind is a network's.
@@ -16,6 +19,45 @@ pub const CHECKPOINT: &str = "checkpoint";
 
 /// Bytes of a number.
 const F32_BYTES: usize = size_of::<f32>();
+/// Bytes of the header's length, which comes first.
+const LENGTH_BYTES: usize = size_of::<u64>();
+/// A longer header is refused: that of a checkpoint after 75,000 epochs, a line of metrics each, has so much.
+const MOST_HEADER_BYTES: u64 = 64 << 20;
+/// How the header of every file of hilt begins.
+const HEADER_START: &[u8] = b"{\"__metadata__\":{\"hilt\":";
+
+/// What weights look like from outside.
+const FORMAT: Format = Format {
+    most_bytes: 640 << 20,
+    reason: "a checkpoint of the largest networks that settings allow has some 590 MB",
+    head: check_head,
+    ends: check_ends,
+};
+
+fn check_head(path: &Path, head: &[u8]) -> Result<()> {
+    let header = head.get(LENGTH_BYTES..).unwrap_or_default();
+    if !header.starts_with(b"{") {
+        return Err(Error::input(path, "is no safetensors file; expected weights of hilt pretrain or hilt train"));
+    }
+    if !header.starts_with(HEADER_START) {
+        let why = "was not written by hilt, or rewritten by another program: its header has no \"hilt\" key at its beginning";
+        return Err(Error::input(path, why));
+    }
+    Ok(())
+}
+
+fn check_ends(path: &Path, ends: &Ends) -> Result<()> {
+    let length = ends.at(path, 0, LENGTH_BYTES)?;
+    let length = length.first_chunk().map_or(0, |bytes| u64::from_le_bytes(*bytes));
+    if length > MOST_HEADER_BYTES {
+        return Err(Error::input(path, format!("its header has {length} bytes, hilt reads at most {MOST_HEADER_BYTES}")));
+    }
+    let (whole, found) = (LENGTH_BYTES as u64 + length, ends.len());
+    if whole > found {
+        return Err(Error::input(path, format!("is cut short: its header ends at byte {whole}, the file at {found}")));
+    }
+    Ok(())
+}
 
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -82,7 +124,7 @@ pub fn read(path: &Path, kind: &str) -> Result<(Vec<NamedTensor>, Value, Provena
 /// # Errors
 /// As [`read`].
 pub fn read_hashed(path: &Path, kind: &str) -> Result<(Vec<NamedTensor>, Value, Provenance, ContentHash)> {
-    let bytes = read_bytes(path)?;
+    let bytes = FORMAT.read(path)?;
     let (found, tensors, meta, provenance) = decode(path, &bytes)?;
     if found != kind {
         return Err(Error::input(path, format!("holds the weights of a {}, a {} is needed", named(&found), named(kind))));
@@ -91,37 +133,63 @@ pub fn read_hashed(path: &Path, kind: &str) -> Result<(Vec<NamedTensor>, Value, 
 }
 
 fn named(kind: &str) -> String {
-    if kind == CHECKPOINT { "checkpoint of training".into() } else { format!("{kind} network") }
+    if kind == CHECKPOINT { "checkpoint of training".into() } else { format!("{} network", shown(kind)) }
 }
 
 /// As [`read`], of any kind; the kind comes first.
 pub(super) fn read_any(path: &Path) -> Result<(String, Vec<NamedTensor>, Value, Provenance)> {
-    decode(path, &read_bytes(path)?)
+    decode(path, &FORMAT.read(path)?)
 }
 
-fn decode(path: &Path, bytes: &[u8]) -> Result<(String, Vec<NamedTensor>, Value, Provenance)> {
-    let invalid = |e| Error::input(path, format!("is no whole safetensors file: {e}"));
-    let file = SafeTensors::deserialize(bytes).map_err(invalid)?;
-    let (_, metadata) = SafeTensors::read_metadata(bytes).map_err(invalid)?;
+/// Kind, tensors, description and provenance in the bytes of the file at `path`.
+///
+/// # Errors
+/// [`Error::Input`] as [`read`].
+pub fn decode(path: &Path, bytes: &[u8]) -> Result<(String, Vec<NamedTensor>, Value, Provenance)> {
+    FORMAT.check(path, bytes)?;
+    seal::check(path, bytes).map_err(|why| no_number(path, bytes).unwrap_or(why))?;
+    guarded(|| decode_sealed(path, bytes)).unwrap_or_else(|why| Err(Error::input(path, format!("damaged: {why}"))))
+}
+
+fn decode_sealed(path: &Path, bytes: &[u8]) -> Result<(String, Vec<NamedTensor>, Value, Provenance)> {
+    let invalid = |e| Error::input(path, format!("is no whole safetensors file: {}", shown(&format!("{e}"))));
+    let (header_bytes, metadata) = SafeTensors::read_metadata(bytes).map_err(invalid)?;
     let header = metadata.metadata().as_ref().and_then(|m| m.get(provenance::KEY));
     let header = header.ok_or_else(|| Error::input(path, "was not written by hilt: its header has no \"hilt\" key"))?;
-    let header: Header =
-        serde_json::from_str(header).map_err(|e| Error::input(path, format!("its header cannot be read: {e}")))?;
+    let unreadable = |why| Error::input(path, format!("its header cannot be read: {why}"));
+    let header: Header = json_text::parse(header.as_bytes()).map_err(unreadable)?;
     let provenance = Provenance::from_value(path, header.provenance)?;
-    let tensors = header.order.iter().map(|name| tensor(path, &file, name)).collect::<Result<Vec<_>>>()?;
-    seal::check(path, bytes)?;
+    let (names, all) = (header.order.iter().collect::<BTreeSet<_>>().len(), metadata.offset_keys().len());
+    if names != header.order.len() || names != all {
+        let message = format!("its order has {} names, {names} of them different, for {all} tensors", header.order.len());
+        return Err(Error::input(path, message));
+    }
+    let data = &bytes[LENGTH_BYTES + header_bytes..];
+    let tensors = header.order.iter().map(|name| tensor(path, &metadata, data, name)).collect::<Result<Vec<_>>>()?;
     Ok((header.kind, tensors, header.meta, provenance))
 }
 
-fn tensor(path: &Path, file: &SafeTensors, name: &str) -> Result<NamedTensor> {
-    let view = file.tensor(name).map_err(|e| Error::input(path, format!("{name}: {e}")))?;
-    if view.dtype() != Dtype::F32 {
-        return Err(Error::input(path, format!("{name} is of type {:?}, hilt reads F32", view.dtype())));
+/// What is wrong with a file that was changed so that it holds numbers that are none: worth more than that it was changed.
+fn no_number(path: &Path, bytes: &[u8]) -> Option<Error> {
+    let length = bytes.first_chunk().map(|bytes| u64::from_le_bytes(*bytes))?;
+    let (numbers, _) = bytes.get(LENGTH_BYTES + length as usize..)?.as_chunks();
+    let mut numbers = numbers.iter().map(|b| f32::from_le_bytes(*b)).enumerate();
+    let (at, found) = numbers.find(|(_, v)| !v.is_finite())?;
+    Some(Error::input(path, format!("was changed after it was written: number {at} is {found}, weights must be finite")))
+}
+
+fn tensor(path: &Path, metadata: &Metadata, data: &[u8], name: &str) -> Result<NamedTensor> {
+    let shown = shown(name);
+    let info = metadata.info(name).ok_or_else(|| Error::input(path, format!("tensor {shown} is missing")))?;
+    if info.dtype != Dtype::F32 {
+        return Err(Error::input(path, format!("{shown} is of type {:?}, hilt reads F32", info.dtype)));
     }
-    let word = |b: &[u8]| f32::from_le_bytes([b[0], b[1], b[2], b[3]]);
-    let data: Vec<f32> = view.data().chunks_exact(F32_BYTES).map(word).collect();
-    check_finite(path, name, &data)?;
-    Ok(NamedTensor { name: name.into(), shape: view.shape().to_vec(), data })
+    let bytes = data.get(info.data_offsets.0..info.data_offsets.1);
+    let bytes = bytes.ok_or_else(|| Error::input(path, format!("{shown} lies behind the end of the file")))?;
+    let (words, _) = bytes.as_chunks::<F32_BYTES>();
+    let data: Vec<f32> = words.iter().map(|word| f32::from_le_bytes(*word)).collect();
+    check_finite(path, &shown, &data)?;
+    Ok(NamedTensor { name: name.into(), shape: info.shape.clone(), data })
 }
 
 fn check_finite(path: &Path, name: &str, data: &[f32]) -> Result<()> {

@@ -4,6 +4,7 @@
 use super::hil::Averages;
 use super::learner::{Descent, Learner};
 use super::metrics::EpochMetrics;
+use super::past;
 use super::policy::Policy;
 use super::selection::Selection;
 use super::weights::{Reader, vector};
@@ -37,21 +38,21 @@ pub(super) struct State {
 }
 
 #[derive(Clone, Debug, Serialize, Deserialize)]
-struct Counts {
-    updates: u64,
-    draws: u64,
-    skipped: u64,
-    net: Steps,
-    std: Steps,
+pub(super) struct Counts {
+    pub updates: u64,
+    pub draws: u64,
+    pub skipped: u64,
+    pub net: Steps,
+    pub std: Steps,
     /// One an ensemble member.
-    model_adam: Option<Vec<u32>>,
-    averages: Averages,
+    pub model_adam: Option<Vec<u32>>,
+    pub averages: Averages,
 }
 
 #[derive(Clone, Copy, Debug, Serialize, Deserialize)]
-struct Steps {
-    adam: u32,
-    ema: u32,
+pub(super) struct Steps {
+    pub adam: u32,
+    pub ema: u32,
 }
 
 const NET: &str = "policy.net";
@@ -83,16 +84,16 @@ impl Checkpoint {
     pub(super) fn restore(&self, learner: &mut Learner) -> Result<(State, History), String> {
         let reader = Reader { tensors: &self.tensors, meta: &self.meta };
         let counts: Counts = reader.meta("counts")?;
+        let mut history = History { rows: reader.meta("epochs")?, selection: reader.meta("selection")?, best: None };
+        past::check(&counts, &history, &learner.settings)?;
         learner.restore(&reader, &counts)?;
-        let (rows, selection): (Vec<EpochMetrics>, Selection) = (reader.meta("epochs")?, reader.meta("selection")?);
-        let best = selection.best().map(|_| {
+        if history.selection.best().is_some() {
             let mut best = learner.policy.clone();
             best.net.params_mut().copy_from_slice(&reader.tensor(BEST_NET, &[learner.policy.net.params().len()])?);
-            best.log_std = reader.tensor(BEST_STD, &[best.log_std.len()])?;
-            Ok::<_, String>(best)
-        });
-        let state = learner.state(counts.averages);
-        Ok((state, History { rows, selection, best: best.transpose()? }))
+            best.log_std = reader.log_std(BEST_STD)?;
+            history.best = Some(best);
+        }
+        Ok((learner.state(counts.averages), history))
     }
 }
 
@@ -145,7 +146,7 @@ impl Learner {
     fn restore(&mut self, reader: &Reader, counts: &Counts) -> Result<(), String> {
         let (net, std) = (self.policy.net.params().len(), self.policy.log_std.len());
         self.policy.net.params_mut().copy_from_slice(&reader.tensor(NET, &[net])?);
-        self.policy.log_std = reader.tensor(STD, &[std])?;
+        self.policy.log_std = reader.log_std(STD)?;
         self.net_descent = descent(reader, NET, net, self.settings.ema_decay, counts.net)?;
         self.std_descent = descent(reader, STD, std, self.settings.ema_decay, counts.std)?;
         if let Some(model) = &mut self.model {
@@ -189,7 +190,11 @@ fn push_descent(out: &mut Vec<NamedTensor>, name: &str, descent: &Descent) {
 
 fn adam(reader: &Reader, name: &str, len: usize, steps: u32) -> Result<Adam, String> {
     let first = reader.tensor(&format!("{name}.first_moment"), &[len])?;
-    Ok(Adam::from_state(first, reader.tensor(&format!("{name}.second_moment"), &[len])?, steps))
+    let second = reader.tensor(&format!("{name}.second_moment"), &[len])?;
+    match second.iter().find(|v| **v < 0.0) {
+        Some(v) => Err(format!("tensor {name}.second_moment holds {v}; means of squares are 0 or more")),
+        None => Ok(Adam::from_state(first, second, steps)),
+    }
 }
 
 fn descent(reader: &Reader, name: &str, len: usize, decay: f64, steps: Steps) -> Result<Descent, String> {

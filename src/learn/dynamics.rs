@@ -205,8 +205,9 @@ impl Dynamics {
     pub fn from_tensors(tensors: &[NamedTensor], meta: &Value) -> Result<Self, String> {
         let reader = Reader { tensors, meta };
         let task = reader.task("dynamics")?;
-        let features = reader.features("dynamics", task)?;
         let settings: PretrainSettings = reader.meta("settings")?;
+        settings.validate().map_err(|why| format!("its settings cannot have trained it: {why}"))?;
+        let features = reader.features("dynamics", task)?;
         let network = |name: &str| reader.network(name, features.width() + JOINTS, BASE_DIM);
         let (net, others) = (network("dynamics")?, (1..settings.ensemble).map(|i| network(&member(i - 1))));
         let others = others.collect::<Result<_, _>>()?;
@@ -245,6 +246,22 @@ mod tests {
             assert_eq!(back.as_ref(), Ok(&dynamics));
             let next = dynamics.predict(corpus.state(4), &[0.1; JOINTS]);
             assert_eq!(next[BASE_DIM..], corpus.state(4)[BASE_DIM..]);
+        }
+    }
+
+    #[test]
+    fn a_description_out_of_its_limits_is_refused() {
+        let corpus = Corpus::new(&demos(Task::Stack, 3, 20, 0), "training").expect("demos");
+        let dynamics = Dynamics::new(&corpus, &PretrainSettings::default(), &mut stream(0, "test", 0));
+        for (key, value, said) in [
+            ("hidden", json!([0]), "is [0]: networks have 1 to 16 hidden layers of 1 to 4096 units"),
+            ("settings", json!({ "ensemble": u64::MAX }), "its settings cannot have trained it"),
+            ("settings", json!({ "ensemble": 100 }), "dynamics.member_2.layer_1.weight is missing"),
+        ] {
+            let mut meta = dynamics.meta();
+            meta[key] = value;
+            let message = Dynamics::from_tensors(&dynamics.to_tensors(), &meta).expect_err(key);
+            assert!(message.contains(said), "{key}: {message}");
         }
     }
 

@@ -100,7 +100,7 @@ fn warm_start(run: &mut Run, settings: &TrainSettings) -> Result<()> {
         let shuffled = batches.shuffled(&mut stream(run.learner.seed, "train.warm-start", epoch));
         let (mut l_bc, mut d_conv) = (Mean::default(), Mean::default());
         let mut metrics = EpochMetrics::new(WARM_START, epoch + 1, total.div_ceil(per_epoch));
-        for rows in shuffled.iter().take((total - run.learner.updates) as usize) {
+        for rows in shuffled.iter().take(total.saturating_sub(run.learner.updates) as usize) {
             run.check()?;
             let learner = &mut run.learner;
             let cloned = learner.behavior_cloning(rows, rows.len() as f64 / learner.mean_length())?;
@@ -184,6 +184,13 @@ pub(super) struct Averages {
     d_conv: Option<f64>,
     /// Mean of the logarithm of the ratio of the two gradients' lengths, over the last epochs.
     log_ratio: Option<f64>,
+}
+
+impl Averages {
+    /// Those of d_conv and of the logarithm, where there are any.
+    pub(super) fn known(self) -> (Option<f64>, Option<f64>) {
+        (self.d_conv, self.log_ratio)
+    }
 }
 
 /// Share of the past in the mean ratio of the gradients' lengths, which is measured once an epoch.

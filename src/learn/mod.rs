@@ -17,6 +17,7 @@ mod limits;
 mod metrics;
 mod model_report;
 mod multi_step;
+mod past;
 mod policy;
 pub mod pretrain_dynamics;
 mod pushes;

@@ -4,7 +4,7 @@ use super::corpus::Corpus;
 use super::features::Features;
 use super::scaling::Scaling;
 use super::weights::{Reader, push_features, push_network, push_scaling, vector};
-use crate::config::TrainSettings;
+use crate::config::{MOST_STEPS, TrainSettings};
 use crate::math::{exp_f32, ln};
 use crate::nn::{Lanes, Mlp, Pass};
 use crate::seed::normal;
@@ -18,6 +18,8 @@ use serde_json::{Value, json};
 const ACTION_FLOOR_RAD_S: f32 = 0.01;
 /// The horizon of an episode over the 95th percentile of the demos' lengths.
 const HORIZON_OVER_P95: usize = 2;
+/// The longest horizon: no demo has more steps than `simulate.max_steps` may be.
+const MOST_HORIZON_STEPS: u32 = HORIZON_OVER_P95 as u32 * MOST_STEPS;
 
 /// pi_theta with everything needed to run it.
 #[derive(Clone, Debug, PartialEq)]
@@ -137,16 +139,22 @@ impl Policy {
     pub fn from_tensors(tensors: &[NamedTensor], meta: &Value) -> Result<Self, String> {
         let reader = Reader { tensors, meta };
         let task = reader.task("policy")?;
+        let horizon_steps: u32 = reader.meta("horizon_steps")?;
+        if !(1..=MOST_HORIZON_STEPS).contains(&horizon_steps) {
+            return Err(format!("\"horizon_steps\" of the description is {horizon_steps}; allowed: 1 to {MOST_HORIZON_STEPS}"));
+        }
+        let settings: TrainSettings = reader.meta("settings")?;
+        settings.validate().map_err(|why| format!("its settings cannot have trained it: {why}"))?;
         let features = reader.features("policy", task)?;
         let net = reader.network("policy", features.width(), JOINTS)?;
         Ok(Policy {
             task,
-            horizon_steps: reader.meta("horizon_steps")?,
+            horizon_steps,
             features,
             action: reader.scaling("policy.action", JOINTS)?,
             net,
-            log_std: reader.tensor("policy.log_std", &[JOINTS])?,
-            settings: reader.meta("settings")?,
+            log_std: reader.log_std("policy.log_std")?,
+            settings,
         })
     }
 }
@@ -177,6 +185,38 @@ mod tests {
         other = meta.clone();
         other["network"] = json!("dynamics");
         assert!(refused(&tensors, &other).contains("dynamics"));
+    }
+
+    #[test]
+    fn a_description_out_of_its_limits_is_refused_before_anything_is_made_of_it() {
+        let corpus = Corpus::new(&demos(Task::Stack, 3, 20, 0), "training").expect("demos");
+        let policy = Policy::new(&corpus, &TrainSettings::default(), &mut stream(0, "test", 0));
+        for (key, value, said) in [
+            ("hidden", json!([0]), "is [0]: networks have 1 to 16 hidden layers of 1 to 4096 units"),
+            ("hidden", json!([]), "is []: networks have"),
+            ("hidden", json!(vec![8; 17]), "networks have 1 to 16"),
+            ("hidden", json!([u64::MAX, u64::MAX]), "networks have 1 to 16"),
+            ("horizon_steps", json!(0), "is 0; allowed: 1 to 20000"),
+            ("horizon_steps", json!(4_294_967_295u32), "is 4294967295; allowed: 1 to 20000"),
+            ("horizon_steps", json!("9".repeat(100_000)), "(100002 characters)"),
+            ("settings", json!({ "tau": 0.0 }), "train.tau = 0"),
+            ("settings", json!({ "hidden_units": 1e18 as u64 }), "train.hidden_units"),
+        ] {
+            let mut meta = policy.meta();
+            meta[key] = value;
+            let message = Policy::from_tensors(&policy.to_tensors(), &meta).expect_err(key);
+            assert!(message.contains(said) && message.len() < 500, "{key}: {message}");
+        }
+        for (name, value, said) in [
+            ("policy.state.std", 0.0, "above 0"),
+            ("policy.log_std", f32::NAN, "NaN"),
+            ("policy.log_std", 1e30, "allowed: -40 to 40"),
+        ] {
+            let mut tensors = policy.to_tensors();
+            tensors.iter_mut().find(|t| t.name == name).expect("a tensor").data[0] = value;
+            let message = Policy::from_tensors(&tensors, &policy.meta()).expect_err(name);
+            assert!(message.contains(said), "{name}: {message}");
+        }
     }
 
     #[test]

@@ -190,3 +190,43 @@ fn a_checkpoint_that_does_not_fit_is_refused() {
     other.meta["counts"]["updates"] = "many".into();
     assert!(refused(Method::Bc, &quick(), other).contains("counts"));
 }
+
+#[test]
+fn a_checkpoint_of_a_past_that_cannot_be_is_refused_before_training_goes_on() {
+    let settings = TrainSettings { select_episodes: 5, ..quick() };
+    let (mut kept, go) = (None, Interrupt::default());
+    let few = |policy: &Policy| score(policy).map(|n| n % 5);
+    let keep = Box::new(|c: &Checkpoint| kept = Some(c.clone()));
+    let hooks = Hooks { keep, keep_every: Some(Duration::ZERO), score: Box::new(few), ..Hooks::new(&go) };
+    run(Method::Bc, &settings, hooks).expect("trains");
+    let kept = kept.expect("kept");
+    let last = kept.meta["epochs"].as_array().map_or(0, Vec::len) - 1;
+    let huge = Value::from(1_000_000_000_000_000u64);
+    let cases: [(String, Value); 13] = [
+        ("/epochs".into(), Value::Array(vec![])),
+        (format!("/epochs/{last}/epochs"), 0.into()),
+        (format!("/epochs/{last}/epoch"), 0.into()),
+        (format!("/epochs/{last}/epoch"), huge.clone()),
+        (format!("/epochs/{last}/stage"), "pretrain".into()),
+        (format!("/epochs/{last}/updates"), huge.clone()),
+        ("/epochs/0/skipped".into(), huge.clone()),
+        ("/counts/updates".into(), 0.into()),
+        ("/counts/draws".into(), u64::MAX.into()),
+        ("/counts/net/adam".into(), u32::MAX.into()),
+        ("/counts/averages/log_ratio".into(), 1e300.into()),
+        ("/selection/chosen".into(), u64::MAX.into()),
+        ("/selection/candidates/0/successes".into(), huge.clone()),
+    ];
+    for (place, value) in cases {
+        let mut other = kept.clone();
+        *other.meta.pointer_mut(&place).expect("a place") = value;
+        let hooks = Hooks { resume: Some(other), score: Box::new(few), ..Hooks::new(&go) };
+        let refused = run(Method::Bc, &settings, hooks).map(|_| ()).expect_err(&place).to_string();
+        assert!(refused.contains("the checkpoint does not fit"), "{place}: {refused}");
+    }
+    let mut negative = kept;
+    negative.tensors.iter_mut().find(|t| t.name == "policy.net.second_moment").expect("moments").data[0] = -1.0;
+    let hooks = Hooks { resume: Some(negative), score: Box::new(few), ..Hooks::new(&go) };
+    let refused = run(Method::Bc, &settings, hooks).expect_err("refused").to_string();
+    assert!(refused.contains("means of squares"), "{refused}");
+}

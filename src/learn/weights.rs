@@ -2,12 +2,17 @@
 
 use super::features::{Features, derived_width};
 use super::scaling::Scaling;
-use crate::config::FeatureSet;
+use crate::config::{FeatureSet, MOST_LAYERS, MOST_UNITS};
 use crate::nn::{Activation, Mlp};
+use crate::state::JOINTS;
 use crate::tasks::Task;
 use crate::tensor::NamedTensor;
+use crate::words::shown;
 use serde::de::DeserializeOwned;
 use serde_json::Value;
+
+/// Size of a logarithm whose exponential single precision holds, with room for what it is multiplied with.
+const LARGEST_LOG_STD: f32 = 40.0;
 
 /// A one-dimensional tensor.
 pub fn vector(name: &str, data: &[f32]) -> NamedTensor {
@@ -49,14 +54,17 @@ impl Reader<'_> {
     /// An entry of the description.
     pub fn meta<T: DeserializeOwned>(&self, key: &str) -> Result<T, String> {
         let value = self.meta.get(key).ok_or_else(|| format!("the description has no \"{key}\""))?;
-        serde_json::from_value(value.clone()).map_err(|e| format!("\"{key}\" of the description is {value}: {e}"))
+        T::deserialize(value).map_err(|e| {
+            let (value, why) = (shown(&value.to_string()), shown(&e.to_string()));
+            format!("\"{key}\" of the description is {value}: {why}")
+        })
     }
 
     /// The kind and task of the network; refuses another kind, and a state size that is not the task's.
     pub fn task(&self, kind: &str) -> Result<Task, String> {
         let found: String = self.meta("network")?;
         if found != kind {
-            return Err(format!("these are weights of a {found} network, but a {kind} network is needed"));
+            return Err(format!("these are weights of a {} network, but a {kind} network is needed", shown(&found)));
         }
         let task: Task = self.meta("task")?;
         let dim: usize = self.meta("state_dim")?;
@@ -70,8 +78,8 @@ impl Reader<'_> {
     pub fn tensor(&self, name: &str, shape: &[usize]) -> Result<Vec<f32>, String> {
         let tensor = self.tensors.iter().find(|t| t.name == name).ok_or_else(|| format!("tensor {name} is missing"))?;
         if tensor.shape != shape || tensor.data.len() != shape.iter().product::<usize>() {
-            let (got, count) = (&tensor.shape, tensor.data.len());
-            return Err(format!("tensor {name} has shape {got:?} with {count} numbers, but {shape:?} is needed"));
+            let (got, count) = (shown(&format!("{:?}", tensor.shape)), tensor.data.len());
+            return Err(format!("tensor {name} has shape {got} with {count} numbers, but {shape:?} is needed"));
         }
         match tensor.data.iter().position(|v| !v.is_finite()) {
             Some(at) => Err(format!("tensor {name} holds {} at {at}, not a finite number", tensor.data[at])),
@@ -89,6 +97,15 @@ impl Reader<'_> {
         }
     }
 
+    /// Logarithms of the standard deviations of an action; refuses one that is out of all proportion.
+    pub fn log_std(&self, name: &str) -> Result<Vec<f32>, String> {
+        let values = self.tensor(name, &[JOINTS])?;
+        match values.iter().find(|v| v.abs() > LARGEST_LOG_STD) {
+            Some(v) => Err(format!("tensor {name} holds {v}; allowed: -{LARGEST_LOG_STD} to {LARGEST_LOG_STD}")),
+            None => Ok(values),
+        }
+    }
+
     /// What [`push_features`] wrote.
     pub fn features(&self, name: &str, task: Task) -> Result<Features, String> {
         let set: FeatureSet = self.meta("features")?;
@@ -101,6 +118,13 @@ impl Reader<'_> {
     pub fn network(&self, name: &str, inputs: usize, outputs: usize) -> Result<Mlp, String> {
         let activation: Activation = self.meta("activation")?;
         let hidden: Vec<usize> = self.meta("hidden")?;
+        let allowed = 1..=MOST_UNITS as usize;
+        if !(1..=MOST_LAYERS as usize).contains(&hidden.len()) || !hidden.iter().all(|units| allowed.contains(units)) {
+            let found = shown(&format!("{hidden:?}"));
+            return Err(format!(
+                "\"hidden\" of the description is {found}: networks have 1 to {MOST_LAYERS} hidden layers of 1 to {MOST_UNITS} units"
+            ));
+        }
         let widths: Vec<usize> = [inputs].into_iter().chain(hidden).chain([outputs]).collect();
         let mut params = Vec::new();
         for (layer, pair) in widths.windows(2).enumerate() {

@@ -2,6 +2,7 @@
 
 mod datasets;
 mod fixtures;
+mod hostile;
 mod interop;
 mod limits;
 mod viewers;

@@ -6,7 +6,8 @@ mod text;
 pub use text::inspect_text;
 
 use super::dataset::{self, Dataset, TRAIN, VALIDATION};
-use super::{Provenance, json_file, recording, table_file, weights};
+use super::peek::{Format, format_of};
+use super::{Provenance, bytes, json_file, recording, table_file, weights};
 use crate::error::{Error, Result};
 use crate::interrupt::Interrupt;
 use crate::state::{State, action_names};
@@ -25,18 +26,38 @@ pub fn inspect(path: &Path, interrupt: &Interrupt) -> Result<Value> {
     if path.is_dir() {
         return directory(path, interrupt);
     }
-    match path.extension().and_then(|e| e.to_str()) {
-        Some("mcap") => recordings::one(path),
-        Some("parquet") => table(path),
-        Some("safetensors") => network(path),
-        Some("json") => summary(path),
-        _ => {
-            let message =
-                "is no artefact of hilt; expected .mcap, .parquet, .safetensors, .json, a dataset or a directory of recordings";
-            std::fs::metadata(path).map_err(|e| Error::io(path, "read", e))?;
-            Err(Error::input(path, message))
+    match format(path)? {
+        Format::Mcap => recordings::one(path),
+        Format::Parquet => table(path),
+        Format::Safetensors => network(path),
+        Format::Json => summary(path),
+        _ => Err(Error::input(
+            path,
+            "is no artefact of hilt; expected a recording (MCAP), a table (Parquet), weights (safetensors), a summary (JSON), a dataset or \
+             a directory of recordings",
+        )),
+    }
+}
+
+/// The format that a file's first bytes tell, whatever its ending; where they tell none, and for what can be read only once (a pipe),
+/// that of its ending, whose reader says what is missing.
+fn format(path: &Path) -> Result<Format> {
+    let kind = std::fs::metadata(path).map_err(|e| Error::io(path, "read", e))?;
+    if kind.is_file() {
+        let head = bytes::head(path)?;
+        bytes::refuse_placeholder(path, &head)?;
+        match format_of(&head) {
+            Format::Other => {}
+            known => return Ok(known),
         }
     }
+    Ok(match path.extension().and_then(|e| e.to_str()) {
+        Some("mcap") => Format::Mcap,
+        Some("parquet") => Format::Parquet,
+        Some("safetensors") => Format::Safetensors,
+        Some("json") => Format::Json,
+        _ => Format::Other,
+    })
 }
 
 fn directory(path: &Path, interrupt: &Interrupt) -> Result<Value> {

@@ -1,6 +1,7 @@
 //! One recording, and a directory of them.
 
-use super::{answer, by_entry, recording, statistics};
+use super::{Provenance, answer, by_entry, recording, statistics};
+use crate::data::ContentHash;
 use crate::demo::{Episode, Phase, Step};
 use crate::error::{Error, Result};
 use crate::interrupt::Interrupt;
@@ -41,32 +42,121 @@ pub(super) fn all(dir: &Path, interrupt: &Interrupt) -> Result<Value> {
     if files.is_empty() {
         return Err(Error::input(dir, "is neither a dataset nor a directory of recordings (episode-00000.mcap, ...)"));
     }
-    let (mut episodes, mut origin) = (Vec::new(), None);
+    let (mut all, mut origins) = (Counts::default(), Origins::default());
     for file in &files {
         interrupt.check()?;
         let (episode, provenance) = recording::read(file)?;
-        origin = Some(provenance);
-        episodes.push(episode);
+        all.add(&episode);
+        origins.add(provenance);
     }
-    let origin = origin.expect("there is at least one recording");
-    let mut failures: BTreeMap<&str, usize> = BTreeMap::new();
-    for class in episodes.iter().filter_map(|e| e.failure) {
-        *failures.entry(class.name()).or_default() += 1;
+    Ok(origins.describe(all.describe()))
+}
+
+/// What is kept of each recording: a directory of them is described in the memory of one.
+#[derive(Default)]
+struct Counts {
+    steps: Vec<f64>,
+    rewards: Vec<f64>,
+    failures: BTreeMap<&'static str, usize>,
+    failed: Vec<u64>,
+    hit: usize,
+}
+
+impl Counts {
+    fn add(&mut self, episode: &Episode) {
+        self.steps.push(episode.steps.len() as f64);
+        self.rewards.push(reward(episode));
+        if let Some(class) = episode.failure {
+            *self.failures.entry(class.name()).or_default() += 1;
+        }
+        if !episode.success {
+            self.failed.push(episode.index);
+        }
+        self.hit += usize::from(moments(episode).any(|s| s.contacts.robot_obstacle));
     }
-    let failed: Vec<u64> = episodes.iter().filter(|e| !e.success).map(|e| e.index).collect();
-    let hit = |e: &&Episode| e.steps.iter().chain([&e.last]).any(|s| s.contacts.robot_obstacle);
-    let rest = json!({
-        "task": origin.task,
-        "episodes": episodes.len(),
-        "episodes_with_obstacle_contact": episodes.iter().filter(hit).count(),
-        "successes": episodes.len() - failed.len(),
-        "failures": failures,
-        "failed_episodes": failed,
-        "steps": episodes.iter().map(|e| e.steps.len()).sum::<usize>(),
-        "episode_steps": statistics(episodes.iter().map(|e| e.steps.len() as f64)),
-        "episode_reward": statistics(episodes.iter().map(reward)),
-    });
-    Ok(answer("recordings", &origin, rest))
+
+    fn describe(&self) -> Map<String, Value> {
+        let fields = [
+            ("kind", json!("recordings")),
+            ("episodes", json!(self.steps.len())),
+            ("episodes_with_obstacle_contact", json!(self.hit)),
+            ("successes", json!(self.steps.len() - self.failed.len())),
+            ("failures", json!(self.failures)),
+            ("failed_episodes", json!(self.failed)),
+            ("steps", json!(self.steps.iter().sum::<f64>() as u64)),
+            ("episode_steps", json!(statistics(self.steps.iter().copied()))),
+            ("episode_reward", json!(statistics(self.rewards.iter().copied()))),
+        ];
+        Map::from_iter(fields.map(|(key, value)| (key.to_string(), value)))
+    }
+}
+
+/// Where the recordings of a directory come from: one provenance, or several, which are counted.
+#[derive(Default)]
+struct Origins {
+    first: Option<Provenance>,
+    /// How many have the first provenance.
+    like_first: usize,
+    /// The others, by the hash of their provenance, in the order of the files: how many, and what they are.
+    others: Vec<(usize, Map<String, Value>)>,
+    places: BTreeMap<String, usize>,
+}
+
+impl Origins {
+    fn add(&mut self, found: Provenance) {
+        let first = self.first.get_or_insert_with(|| found.clone());
+        if *first == found {
+            self.like_first += 1;
+            return;
+        }
+        let key = ContentHash::of(found.to_json().as_bytes()).to_string();
+        let others = &mut self.others;
+        let at = *self.places.entry(key).or_insert_with(|| {
+            others.push((0, origin(&found, &differences(first, &found))));
+            others.len() - 1
+        });
+        others[at].0 += 1;
+    }
+
+    /// The fields with `provenance`, or, where recordings do not agree, with `origins` in its place.
+    fn describe(self, mut fields: Map<String, Value>) -> Value {
+        let Some(first) = self.first else { return Value::Object(fields) };
+        if self.others.is_empty() {
+            fields.extend([("task".into(), json!(first.task)), ("provenance".into(), json!(first))]);
+            return Value::Object(fields);
+        }
+        let of_all = [(self.like_first, origin(&first, ""))].into_iter().chain(self.others);
+        let counted = of_all.map(|(count, mut origin)| {
+            origin.insert("recordings".into(), json!(count));
+            Value::Object(origin)
+        });
+        fields.insert("origins".into(), counted.collect());
+        Value::Object(fields)
+    }
+}
+
+fn origin(of: &Provenance, differs_in: &str) -> Map<String, Value> {
+    let fields = [
+        ("task", json!(of.task)),
+        ("seed", json!(of.seed)),
+        ("stage", json!(of.stage)),
+        ("hilt_version", json!(of.hilt_version)),
+        ("differs_in", json!(differs_in)),
+    ];
+    Map::from_iter(fields.map(|(key, value)| (key.to_string(), value)))
+}
+
+/// The parts in which a provenance is not as the first.
+fn differences(first: &Provenance, other: &Provenance) -> String {
+    let parts = [
+        ("hilt_version", first.hilt_version != other.hilt_version),
+        ("stage", first.stage != other.stage),
+        ("task", first.task != other.task),
+        ("seed", first.seed != other.seed),
+        ("settings", first.settings != other.settings),
+        ("inputs", first.inputs != other.inputs),
+    ];
+    parts.iter().filter(|(_, differ)| *differ).map(|(name, _)| *name).collect::<Vec<_>>().join(", ")
 }
 
 fn moments(episode: &Episode) -> impl Iterator<Item = &Step> {
