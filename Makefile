@@ -41,7 +41,7 @@ RUN = --threads $(THREADS) --log $(DIR)/logs/$(1).log
 # Exit code 3 says that episodes were dropped, counted and named; the rest of the artefact is whole.
 DONE = || test $$? -eq 3
 
-.PHONY: all smoke test check interop bench help clean-runs build need-cargo FORCE
+.PHONY: all smoke test check interop bench fuzz help clean-runs build need-cargo FORCE
 
 all: $(DIR)/evaluation.json ## run every stage of TASK; writes RUNS/TASK/policy.safetensors and RUNS/TASK/evaluation.json
 
@@ -110,6 +110,9 @@ interop: build ## tiny runs of all tasks, read by mcap, pyarrow, DuckDB, pandas,
 
 bench: need-cargo ## measure planner, simulator and training
 	cargo bench --locked
+
+fuzz: need-cargo ## give every reader of files mutated inputs, INPUTS of them (200000), and count what goes wrong
+	cargo bench --locked --bench fuzz -- --inputs $(or $(INPUTS),200000)
 
 clean-runs: ## remove what was made for TASK under RUNS
 	rm -rf $(DIR)
