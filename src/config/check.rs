@@ -11,7 +11,7 @@ use toml::{Table, Value};
 /// A longer key is no slip of the finger, and takes long to compare.
 const LONGEST_KEY: usize = 64;
 /// Boxes of a scene: each is kept with every episode, and met by every distance of a plan.
-const MOST_OBSTACLES: usize = 100;
+pub(super) const MOST_OBSTACLES: usize = 100;
 /// Letters of a reason that are kept at each end.
 const KEPT_OF_REASON: usize = 120;
 

@@ -11,12 +11,14 @@ mod inspect;
 pub mod json_file;
 mod litter;
 mod parquet_file;
+mod parquet_limits;
 pub mod peek;
 mod proto;
 pub mod provenance;
 pub mod recording;
 pub mod seal;
 pub mod table_file;
+mod thrift;
 pub mod weights;
 
 pub use inspect::{inspect, inspect_text};
