@@ -160,7 +160,7 @@ $(STAMP)/evaluate$(OF).toml: $(STAMP)/train$(OF).toml
 build: $(HILT) ## build the optimised binary
 
 # An empty file is no binary.
-SOURCES := $(if $(STAGE_GOAL),,$(shell find src pipelines proto build.rs Cargo.toml Cargo.lock -type f 2>/dev/null; test -s $(HILT) || echo FORCE))
+SOURCES := $(if $(STAGE_GOAL),,$(shell find src pipelines proto build.rs Cargo.toml Cargo.lock -type f 2>/dev/null || true; test -s $(HILT) || echo FORCE))
 
 # cargo says where it built: its own settings may name another directory or another target.
 $(HILT): $(SOURCES)
