@@ -100,7 +100,7 @@ check() {
         why="it was stopped while it put $run/$artefact in place"
     elif [ "$settings" != "${was%%$'\n'"$sizes_follow"*}" ]; then
         why="the settings of $run/$artefact have changed"
-    elif [ "$now" != "$was" ] && ! another_whole "$artefact" "$was" "$now"; then
+    elif [ "$now" != "$was" ] && ! another_whole "$was" "$now"; then
         why="$run/$artefact is missing or damaged, or a file in it is"
     elif [ -n "$before" ] && any_newer "$before" "$stamp"; then
         why="$run/$(artefact_of "$before") was changed by hand"
@@ -113,11 +113,15 @@ check() {
     fi
 }
 
-# Whether an artefact is a whole one that somebody put there, rather than what is left of make's own: it has files that make did not
-# leave, and hilt can read it.
+# Whether all files that are not as a stage left them are whole, so that somebody put them there on purpose, rather than what is left of
+# make's own.
 another_whole() {
-    ! grep -qxFf <(echo "$2") -v <(echo "$3") && return 1
-    "$hilt" inspect "$1" > /dev/null 2>&1
+    local others file
+    others=$(grep -vxFf <(echo "$1") <(echo "$2") | sed -e 's/^# [0-9]* //' -e 's|^dataset/.*|dataset|' | sort -u)
+    [ -n "$others" ] || return 1
+    while read -r file; do
+        "$hilt" inspect "$file" > /dev/null 2>&1 || return 1
+    done <<< "$others"
 }
 
 stale() {
