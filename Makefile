@@ -82,7 +82,6 @@ FLAGS := --pipeline $(call word-of,$(PIPELINE)) --task $(TASK) --seed $(SEED) $(
 RUN = --threads $(THREADS) --log $(DIR)/logs/$(1).log
 SETTINGS := $(HILT) settings $(FLAGS) --threads $(THREADS)
 MADE := tools/made.sh $(DIR) $(METHOD)
-INNER := $(MAKE) --no-print-directory
 
 PLANS      := $(DIR)/plans.parquet
 RECORDINGS := $(DIR)/recordings
@@ -106,7 +105,7 @@ $(POLICY):     LAST := train$(OF)
 $(EVALUATION): LAST := evaluate$(OF)
 $(ARTEFACTS): $(HILT)
 	@$(SETTINGS) > /dev/null
-	@$(INNER) stages LAST=$(LAST)
+	@$(MAKE) --no-print-directory stages LAST=$(LAST)
 
 # --- the stages ---------------------------------------------------------------------------------------------------------------------
 
@@ -180,7 +179,7 @@ need-cargo:
 SMOKE := plan.episodes=12 pretrain.epochs=2 train.warm_start_updates=50 train.epochs=1 train.min_updates=0 evaluate.episodes=8
 SMOKE_DIR := $(RUNS)/smoke/$(TASK)
 smoke: build ## a tiny run of all stages under RUNS/smoke/TASK, in less than a minute
-	@$(INNER) all RUNS=$(RUNS)/smoke SET=$(call word-of,$(SMOKE) $(SET))
+	@$(MAKE) --no-print-directory all RUNS=$(RUNS)/smoke SET=$(call word-of,$(SMOKE) $(SET))
 	$(HILT) evaluate $(FLAGS) --threads $(THREADS) --policy planner --episodes 8
 	$(HILT) inspect $(SMOKE_DIR)/policy$(OF).safetensors
 	$(HILT) render $(SMOKE_DIR)/recordings/episode-00000.mcap --png --out $(SMOKE_DIR)/episode-00000.png
@@ -195,7 +194,7 @@ check: need-cargo ## what CI runs: format, lints, documentation, tests
 	cargo test --release --locked
 
 interop: build ## tiny runs of all tasks, read by mcap, pyarrow, DuckDB, pandas, LeRobot and safetensors (needs Python 3.12)
-	for task in $(TASKS); do $(INNER) all TASK=$$task RUNS=$(RUNS)/smoke SET="$(SMOKE)"; done
+	for task in $(TASKS); do $(MAKE) --no-print-directory all TASK=$$task RUNS=$(RUNS)/smoke SET="$(SMOKE)"; done
 	tests/interop/run.sh $(RUNS)/smoke
 
 bench: need-cargo ## measure planner, simulator and training
