@@ -8,6 +8,7 @@ use hilt::config::{PretrainSettings, TrainSettings};
 use hilt::demo::Demo;
 use hilt::interrupt::Interrupt;
 use hilt::learn::{Learner, pretrain_dynamics};
+use hilt::math::sin_cos;
 use hilt::robot::READY_Q_RAD;
 use hilt::state::{CONTROL_DT_S, JOINTS};
 use hilt::tasks::Task;
@@ -25,7 +26,7 @@ fn demo(index: usize) -> Demo {
     let (mut states, mut actions) = (Vec::new(), Vec::new());
     let mut q = READY_Q_RAD;
     for t in 0..=STEPS {
-        let wave = |i: usize| 0.3 * ((t as f64 / 20.0) + (i + index) as f64).sin();
+        let wave = |i: usize| 0.3 * sin_cos((t as f64 / 20.0) + (i + index) as f64).0;
         let mut state = vec![0.0f32; dim];
         for i in 0..JOINTS {
             (state[i], state[JOINTS + i]) = (q[i] as f32, wave(i) as f32);

@@ -6,6 +6,7 @@ mod scripted;
 
 use criterion::{BatchSize, Criterion, Throughput, criterion_group, criterion_main};
 use hilt::config::{SceneSettings, SimulateSettings};
+use hilt::interrupt::Interrupt;
 use hilt::scene::Scene;
 use hilt::sim::{Controller, Disturbance, World, run_episode};
 use hilt::state::{ARM_JOINTS, Action};
@@ -60,7 +61,7 @@ fn whole_episode(c: &mut Criterion) {
     let run = || {
         let mut script = Script::carry(&scene.block, scene.target_m());
         let mut noise = Disturbance::new(&settings, hilt::seed::stream(0, "simulate", 0));
-        run_episode(0, &scene, &mut script, &mut noise, settings.max_steps)
+        run_episode(0, &scene, &mut script, &mut noise, settings.max_steps, &Interrupt::default()).expect("not interrupted")
     };
     let steps = run().steps.len();
     let mut group = c.benchmark_group("control steps");

@@ -5,6 +5,10 @@ use crate::state::{Action, FINGERS, JOINTS, State};
 use crate::tasks::{FailureClass, Task};
 use serde::{Deserialize, Serialize};
 
+/// No angle \[rad\], position \[m\], velocity \[rad/s, m/s\] or command of this world is larger: what is comes from a simulation that broke down
+/// or from a damaged file, and its square may be more than single precision holds.
+pub const LARGEST_NUMBER: f64 = 1e6;
+
 /// Which part of a plan the demonstrator follows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]

@@ -2,6 +2,11 @@
 
 use std::path::{Path, PathBuf};
 
+/// A process that a signal ended has this exit code, plus the signal's number.
+const SIGNALLED: i32 = 128;
+/// Number of the signal of Ctrl-C on every system.
+const SIGINT: i32 = 2;
+
 /// Why a stage could not do its work. `main` turns it into an exit code.
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
@@ -29,10 +34,10 @@ pub enum Error {
     /// The work itself failed (no plan, no demo left, a loss that is not a number): exit code 1.
     #[error("{0}")]
     Failed(String),
-    /// Ctrl-C or a termination signal: nothing half-written is left; exit code 130.
+    /// Ctrl-C or a termination signal: nothing half-written is left; exit code 130 or 143 (128 + the signal).
     #[error("interrupted; no artefact was changed, run the same command to start again")]
     Interrupted,
-    /// The same in a stage that keeps its state: the words say where it is and how to go on; exit code 130.
+    /// The same in a stage that keeps its state: the words say where it is and how to go on.
     #[error("interrupted; no artefact was changed, {0}")]
     InterruptedAt(String),
 }
@@ -51,11 +56,14 @@ impl Error {
         Error::Io { path: path.to_path_buf(), action, source }
     }
 
-    /// The process exit code of this error.
-    pub fn exit_code(&self) -> u8 {
+    /// The process exit code of this error; `signal` is what interrupted the process, if anything did.
+    pub fn exit_code(&self, signal: Option<i32>) -> u8 {
         match self {
             Error::Usage(_) => 2,
-            Error::Interrupted | Error::InterruptedAt(_) => 130,
+            Error::Interrupted | Error::InterruptedAt(_) => {
+                let code = SIGNALLED + signal.unwrap_or(SIGINT);
+                u8::try_from(code).unwrap_or(1)
+            }
             _ => 1,
         }
     }

@@ -2,30 +2,55 @@
 
 use crate::error::{Error, Result};
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicI32, AtomicUsize, Ordering};
 
-/// A flag that a signal handler sets and that every long loop checks.
+/// A flag that a signal raises and that every long loop checks.
 #[derive(Clone, Debug, Default)]
-pub struct Interrupt(Arc<AtomicBool>);
+pub struct Interrupt(Arc<AtomicI32>);
 
 impl Interrupt {
-    /// The flag itself, for a signal handler to set.
-    pub fn flag(&self) -> Arc<AtomicBool> {
-        Arc::clone(&self.0)
+    /// Raises the flag for this signal number (not 0).
+    pub fn raise(&self, signal: i32) {
+        self.0.store(signal, Ordering::SeqCst);
     }
 
-    /// Raise the flag.
-    pub fn raise(&self) {
-        self.0.store(true, Ordering::SeqCst);
+    /// The signal that raised the flag.
+    pub fn signal(&self) -> Option<i32> {
+        Some(self.0.load(Ordering::SeqCst)).filter(|signal| *signal != 0)
     }
 
     /// Whether the flag is up.
     pub fn is_raised(&self) -> bool {
-        self.0.load(Ordering::SeqCst)
+        self.signal().is_some()
     }
 
     /// `Err(Interrupted)` once the flag is up.
     pub fn check(&self) -> Result<()> {
         if self.is_raised() { Err(Error::Interrupted) } else { Ok(()) }
     }
+}
+
+/// Threads of this process that wait for a file which may never answer: signals end a process, so this is the process's.
+static WAITING: AtomicUsize = AtomicUsize::new(0);
+
+/// Says that this thread waits for the system as long as the value lives: it opens, reads or hashes an input, or opens a pipe, and cannot
+/// ask for an interrupt. Nothing of hilt's own is lost when the process ends there.
+#[derive(Debug)]
+pub struct Waiting(());
+
+/// Begins to wait.
+pub fn waiting() -> Waiting {
+    WAITING.fetch_add(1, Ordering::SeqCst);
+    Waiting(())
+}
+
+impl Drop for Waiting {
+    fn drop(&mut self) {
+        WAITING.fetch_sub(1, Ordering::SeqCst);
+    }
+}
+
+/// Whether any thread waits.
+pub fn anyone_waits() -> bool {
+    WAITING.load(Ordering::SeqCst) > 0
 }

@@ -25,8 +25,8 @@
 //!
 //! A module imports only from those before it; `tests/architecture.rs` holds this, and which modules see which.
 //!
-//! - contracts that all may use: [`state`], [`demo`], [`scene`], [`config`], [`pulse`], [`table`], [`tensor`], [`error`], [`seed`],
-//!   [`interrupt`]
+//! - contracts that all may use: [`state`], [`demo`], [`scene`], [`config`], [`pulse`], [`table`], [`tensor`], [`error`], [`guard`],
+//!   [`interrupt`], [`math`], [`seed`], [`words`]
 //! - [`tasks`], [`robot`], then [`plan`] (scene to demonstration) and [`sim`] (contact physics, the only home of rapier)
 //! - [`data`]: files, the only home of MCAP, Arrow, Parquet and safetensors; knows no learning
 //! - [`nn`] (networks and their engine, knows no robots), then [`learn`] (the method, knows neither files nor simulator)
@@ -40,8 +40,10 @@ pub mod data;
 pub mod demo;
 pub mod error;
 pub mod eval;
+pub mod guard;
 pub mod interrupt;
 pub mod learn;
+pub mod math;
 pub mod nn;
 pub mod plan;
 pub mod pulse;
@@ -54,3 +56,4 @@ pub mod state;
 pub mod table;
 pub mod tasks;
 pub mod tensor;
+pub mod words;

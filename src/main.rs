@@ -2,43 +2,73 @@
 
 use clap::Parser;
 use hilt::cmd::{Cli, Outcome};
-use hilt::interrupt::Interrupt;
+use hilt::interrupt::{Interrupt, anyone_waits};
 use signal_hook::consts::{SIGINT, SIGTERM, SIGXFSZ};
 use signal_hook::flag;
+use signal_hook::iterator::Signals;
 use std::io::Write;
-use std::process::ExitCode;
+use std::process::{ExitCode, exit};
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
+use std::thread;
+use std::time::{Duration, Instant};
 
-/// Exit code of a process that Ctrl-C ended: 128 + SIGINT.
-const INTERRUPTED: i32 = 130;
+/// Exit code of a process that a signal ended: 128 + its number.
+const SIGNALLED: i32 = 128;
 
 /// Ctrl-C, and what `kill`, `timeout` and batch systems send. A hang-up keeps its meaning, so that `nohup` works.
 const INTERRUPTS: [i32; 2] = [SIGINT, SIGTERM];
 
+/// A second signal counts only after this time: a signal to the whole process group, which `make` passes on once more, arrives twice.
+const SAME_SIGNAL: Duration = Duration::from_secs(1);
+
+/// After a signal, how long a thread may wait for an input (a pipe, a stalled file system) before the process ends without it.
+const PATIENCE: Duration = Duration::from_millis(500);
+
+/// How often is looked after a first signal.
+const TICK: Duration = Duration::from_millis(20);
+
 fn main() -> ExitCode {
     let cli = Cli::parse();
+    if let Err(e) = hilt::nn::kernel::choose() {
+        return fail(&e.to_string(), e.exit_code(None));
+    }
     let interrupt = Interrupt::default();
-    if let Err(e) = listen(&interrupt) {
+    if let Err(e) = listen(interrupt.clone()) {
         return fail(&format!("cannot listen for signals: {e}"), 1);
     }
-    match cli.run(interrupt) {
+    match cli.run(interrupt.clone()) {
         Ok(Outcome::Done) => ExitCode::SUCCESS,
         Ok(Outcome::Dropped(_)) => ExitCode::from(Outcome::DROPPED_CODE),
-        Err(e) => fail(&e.to_string(), e.exit_code()),
+        Err(e) => fail(&e.to_string(), e.exit_code(interrupt.signal())),
     }
 }
 
-/// The first signal asks the loops to stop, the second does not wait for them. A file-size limit is an error of `write`, not the
+/// The first signal asks the loops to stop, a later one does not wait for them. A file-size limit is an error of `write`, not the
 /// process's end.
-fn listen(interrupt: &Interrupt) -> std::io::Result<()> {
-    for signal in INTERRUPTS {
-        // In this order: the first signal finds the flag down.
-        flag::register_conditional_shutdown(signal, INTERRUPTED, interrupt.flag())?;
-        flag::register(signal, interrupt.flag())?;
-    }
+fn listen(interrupt: Interrupt) -> std::io::Result<()> {
     flag::register(SIGXFSZ, Arc::<AtomicBool>::default())?;
-    Ok(())
+    let signals = Signals::new(INTERRUPTS)?;
+    thread::Builder::new().name("signals".into()).spawn(move || watch(signals, &interrupt)).map(drop)
+}
+
+fn watch(mut signals: Signals, interrupt: &Interrupt) {
+    let Some(first) = signals.forever().next() else { return };
+    let (since, mut idle_since) = (Instant::now(), Instant::now());
+    interrupt.raise(first);
+    loop {
+        thread::sleep(TICK);
+        if let Some(again) = signals.pending().last().filter(|_| since.elapsed() > SAME_SIGNAL) {
+            exit(SIGNALLED + again);
+        }
+        if !anyone_waits() {
+            idle_since = Instant::now();
+        }
+        if idle_since.elapsed() > PATIENCE {
+            fail("interrupted while it waited for an input; no artefact was changed", 0);
+            exit(SIGNALLED + first);
+        }
+    }
 }
 
 fn fail(message: &str, code: u8) -> ExitCode {

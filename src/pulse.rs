@@ -1,9 +1,9 @@
 //! Pulses: pushes of a few control steps on the arm, the same in the simulator and in the rollouts of state cloning.
 
 use crate::config::PulseSettings;
+use crate::seed::normal;
 use crate::state::ARM_JOINTS;
 use rand::{Rng, RngExt};
-use rand_distr::{Distribution, StandardNormal};
 
 /// The pulse that is under way, if one is.
 #[derive(Clone, Debug, Default)]
@@ -20,7 +20,7 @@ impl Pulse {
         if self.left == 0 {
             let begins = settings.probability > 0.0 && rng.random::<f64>() < settings.probability;
             self.left = if begins { settings.steps } else { 0 };
-            self.unit = std::array::from_fn(|_| if begins { StandardNormal.sample(rng) } else { 0.0 });
+            self.unit = std::array::from_fn(|_| if begins { normal(rng) } else { 0.0 });
         }
         self.unit
     }

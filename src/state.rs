@@ -1,5 +1,6 @@
 //! State and action of the paper: s_t and a_t, with the names and units of their columns.
 
+use crate::math;
 use crate::tasks::Task;
 use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion};
 use serde::{Deserialize, Serialize};
@@ -36,7 +37,8 @@ pub struct Pose {
 impl Pose {
     /// A pose turned by `yaw_rad` about the world's z axis.
     pub fn from_yaw(position_m: [f64; 3], yaw_rad: f64) -> Self {
-        Pose { position_m, quaternion_xyzw: [0.0, 0.0, (yaw_rad / 2.0).sin(), (yaw_rad / 2.0).cos()] }
+        let (sin, cos) = math::sin_cos(yaw_rad / 2.0);
+        Pose { position_m, quaternion_xyzw: [0.0, 0.0, sin, cos] }
     }
 
     /// The same as an nalgebra isometry.

@@ -5,10 +5,11 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// What any module may use: contracts, errors, randomness, settings.
-const EVERYWHERE: [&str; 10] = ["config", "demo", "error", "interrupt", "pulse", "scene", "seed", "state", "table", "tensor"];
+const EVERYWHERE: [&str; 13] =
+    ["config", "demo", "error", "guard", "interrupt", "math", "pulse", "scene", "seed", "state", "table", "tensor", "words"];
 
 /// What else each module may use. A module that is not here is refused, so that a new one gets its place on purpose.
-const FLOW: [(&str, &[&str]); 17] = [
+const FLOW: [(&str, &[&str]); 18] = [
     // Contracts know the tasks, because states and conditions depend on them.
     ("state", &["tasks"]),
     ("scene", &["tasks"]),
@@ -26,6 +27,7 @@ const FLOW: [(&str, &[&str]); 17] = [
     ("cmd", &["data", "eval", "learn", "plan", "report", "robot", "sim", "tasks"]),
     ("error", &[]),
     ("seed", &[]),
+    ("math", &[]),
     ("interrupt", &[]),
 ];
 

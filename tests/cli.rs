@@ -121,11 +121,11 @@ fn missing_and_foreign_files_end_with_one_and_leave_nothing() {
     for file in [&missing, &noise] {
         says(&["simulate", "--task", "pick-up", "--plans", file, "--out", &out], 1, &[file]);
         says(&["convert", "--task", "pick-up", "--recordings", file, "--out", &out], 1, &[file]);
-        says(&["pretrain", "--task", "pick-up", "--dataset", file, "--out", &out], 1, &[file]);
-        says(&["train", "--task", "pick-up", "--dataset", file, "--out", &out], 1, &[file]);
-        says(&["evaluate", "--task", "pick-up", "--policy", file, "--out", &out], 1, &[file]);
+        says(&["pretrain", "--task", "pick-up", "--dataset", file, "--out", &at("out.safetensors")], 1, &[file]);
+        says(&["train", "--task", "pick-up", "--dataset", file, "--out", &at("out.safetensors")], 1, &[file]);
+        says(&["evaluate", "--task", "pick-up", "--policy", file, "--out", &at("out.json")], 1, &[file]);
         says(&["inspect", file], 1, &[file]);
-        says(&["render", file, "--png", "--out", &out], 1, &[file]);
+        says(&["render", file, "--png", "--out", &at("out.png")], 1, &[file]);
     }
     says(&["settings", "--pipeline", &missing], 1, &[&missing, "cannot read"]);
     assert_eq!(fs::read_dir(dir.path()).expect("readable").count(), 1, "something was left behind");
@@ -170,4 +170,82 @@ fn a_reader_that_stops_early_is_no_error() {
     let output = std::process::Command::new("bash").args(["-c", &script]).output().expect("bash runs");
     assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
     assert!(output.stderr.is_empty());
+}
+
+#[test]
+fn a_name_is_offered_when_it_is_near_whatever_its_case_and_none_when_nothing_is() {
+    let set = |words: &str, parts: &[&str]| says(&["settings", "--task", "stack", "--set", words], 2, parts);
+    set("PLAN.SPEED=0.5", &["unknown key PLAN.SPEED; did you mean plan.speed?"]);
+    set("Train.Rho=0.5", &["did you mean train.rho?"]);
+    set("pretrain.activation=tan", &["did you mean tanh?"]);
+    set("train.features=FK", &["did you mean fk?"]);
+    set("train.sc_fingers=folowing", &["did you mean following?"]);
+    let far = refused(&["settings", "--task", "stack", "--set", "xyzzy.foo=1"], 2);
+    assert!(!far.contains("did you mean"), "{far}");
+    says(&["plan", "--task", "stak"], 2, &["unknown task \"stak\"; did you mean stack? allowed: pick-up, pick-and-place, stack"]);
+    says(&["plan", "--task", "pickup"], 2, &["did you mean pick-up?"]);
+    says(&["plan", "--task", "stack", "--preset", "bset"], 2, &["did you mean best?"]);
+    says(&["settings", "--task", "stack", "--stage", "trian"], 2, &["did you mean train?"]);
+    says(&["train", "--task", "stack", "--method", "HIL"], 2, &["did you mean hil?"]);
+}
+
+#[test]
+fn a_number_beyond_64_bits_is_said_with_what_is_allowed() {
+    let huge = "18446744073709551615";
+    says(&["plan", "--task", "stack", "--episodes", huge], 2, &["--episodes", huge, "plan.episodes", "allowed: 1 to 100000"]);
+    let set = |words: &str, parts: &[&str]| says(&["settings", "--task", "stack", "--set", words], 2, parts);
+    set("pretrain.epochs=99999999999999999999999999", &["out of range; allowed: 1 to 1000000"]);
+    set("train.batch=-99999999999999999999999999", &["out of range; allowed: 1 to 100000"]);
+    set("plan.speed=1e999", &["1e999: out of range; allowed: above 0 up to 1"]);
+    set("scene.obstacles=[{center_m=[0,0,.3],size_m=[1,1,1]}]", &["scene.obstacles", "not valid TOML", "expected digits"]);
+}
+
+/// A key of 60,000 parts overflowed the stack; a long one took 18 s.
+#[test]
+fn keys_values_and_files_beyond_their_limits_are_refused_at_once() {
+    let started = std::time::Instant::now();
+    let set = |words: &str, parts: &[&str]| {
+        let stderr = refused(&["settings", "--task", "stack", "--set", words], 2);
+        assert!(parts.iter().all(|part| stderr.contains(part)) && stderr.len() < 2000, "{stderr}");
+    };
+    set(&format!("{}=1", ["a"; 60_000].join(".")), &["a key of 60000 parts; none has more than 3"]);
+    set(&format!("plan.speed={}", "[".repeat(60_000)), &["not valid TOML", "recursion"]);
+    set(&format!("plan.speed={}{}", "[".repeat(60_000), "]".repeat(60_000)), &["not valid TOML", "recursion"]);
+    set(&format!("{}.b=1", "a".repeat(120_000)), &["unknown key aaa", "(120002 characters)"]);
+    set(&format!("plan.speed={}", "fast".repeat(30_000)), &["plan.speed", "(120002 characters)", "above 0 up to 1"]);
+
+    let dir = tempfile::tempdir().expect("temporary directory");
+    let file = dir.path().join("mine.toml");
+    let name = file.to_str().expect("UTF-8 path");
+    let boxes = "[[scene.obstacles]]\ncenter_m = [1.5, 1.5, 0.1]\nsize_m = [0.1, 0.1, 0.1]\n".repeat(101);
+    for (text, part) in [
+        (format!("{} = 1\n", ["a"; 60_000].join(".")), "recursion limit"),
+        (format!("[{}]\nb = 1\n", ["a"; 60_000].join(".")), "recursion limit"),
+        (format!("x = {}{}\n", "[".repeat(60_000), "]".repeat(60_000)), "recurs"),
+        (format!("{} = 1\n", "a".repeat(900_000)), "(900000 characters)"),
+        ("# words\n".repeat(200_000), "longer than 1048576 bytes"),
+        (boxes, "101 boxes; allowed: up to 100"),
+    ] {
+        fs::write(&file, format!("task = \"stack\"\n{text}")).expect("written");
+        let stderr = refused(&["settings", "--pipeline", name], 2);
+        assert!(stderr.contains(part) && stderr.len() < 2000, "{part}: {stderr}");
+    }
+    says(&["settings", "--pipeline", "/dev/zero"], 2, &["/dev/zero", "longer than 1048576 bytes"]);
+    assert!(started.elapsed().as_secs() < 10, "took {:?}", started.elapsed());
+}
+
+#[test]
+fn what_breaks_the_simulation_down_or_takes_all_memory_is_refused_with_the_reason() {
+    let set = |words: &str, parts: &[&str]| says(&["settings", "--task", "pick-up", "--set", words], 2, parts);
+    set(
+        "scene.obstacles=[{center_m=[0.0,0.0,0.3],size_m=[0.02,0.02,0.02]}]",
+        &["scene.obstacles[0]", "arm where every episode begins"],
+    );
+    set("scene.block_mass_kg=1e-21", &["scene.block_mass_kg", "no less than 0.001", "single precision"]);
+    set("scene.block_mass_kg=[1e-21, 0.1]", &["no less than 0.001"]);
+    set("pretrain.hidden_units=4096", &["pretrain.hidden_units = 4096", "5000000 are the most"]);
+    set("train.hidden_units=4096", &["train.hidden_units = 4096", "5000000 are the most"]);
+    set("train.select_candidates=9000000000000000000", &["train.select_candidates", "1 to 1000000"]);
+    set("train.min_updates=9000000000000000000", &["train.min_updates", "0 to 10000000"]);
+    set("train.batch=9000000000000000000", &["train.batch", "1 to 100000"]);
 }

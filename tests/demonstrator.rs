@@ -2,6 +2,7 @@
 
 use hilt::config::{Pipeline, SimulateSettings, Source};
 use hilt::demo::{Episode, Phase};
+use hilt::interrupt::Interrupt;
 use hilt::plan::Planner;
 use hilt::robot::VELOCITY_LIMITS_RAD_S;
 use hilt::seed::stream;
@@ -18,7 +19,8 @@ fn demonstrate(pipeline: &Pipeline, settings: &SimulateSettings, index: u64) -> 
     let plan = Planner::new(&pipeline.plan).plan(index, &scene, &mut stream(0, "demonstrator.search", index)).expect("a plan");
     let mut follower = Follower::new(&plan).expect("the plan has every phase");
     let mut disturbance = Disturbance::new(settings, stream(0, "demonstrator.noise", index));
-    run_episode(index, &scene, &mut follower, &mut disturbance, settings.max_steps)
+    run_episode(index, &scene, &mut follower, &mut disturbance, settings.max_steps, &Interrupt::default())
+        .expect("not interrupted")
 }
 
 #[test]

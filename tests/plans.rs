@@ -4,8 +4,11 @@ mod plan_oracle;
 
 use hilt::config::{PlanSettings, SceneSettings};
 use hilt::demo::Phase;
+use hilt::interrupt::Interrupt;
+use hilt::math::{acos, cos};
 use hilt::plan::{
-    CLEARANCE_M, GRASP_OVER_CENTER_M, LIFTED_CENTER_M, Limits, Plan, PlanError, Planner, RELEASE_GAP_M, from_table, to_table,
+    CLEARANCE_M, GRASP_OVER_CENTER_M, LIFTED_CENTER_M, Limits, Plan, PlanError, Planner, RELEASE_GAP_M, check_ready_pose,
+    from_table, to_table,
 };
 use hilt::robot::{Arm, POSITION_LIMITS_RAD, READY_Q_RAD};
 use hilt::scene::{Obstacle, Scene};
@@ -93,7 +96,7 @@ fn check_hand(plan: &Plan) {
         |phase: Phase| plan.waypoints.iter().rev().find(|w| w.phase == phase).map(|w| arm.tool_pose(&w.q_rad).translation.vector);
     for w in &plan.waypoints {
         let up = arm.tool_pose(&w.q_rad).rotation * nalgebra::Vector3::z();
-        assert!(up.z > LEVEL_RAD.cos(), "hand tilted by {} rad in {}", up.z.acos(), w.phase.name());
+        assert!(up.z > cos(LEVEL_RAD), "hand tilted by {} rad in {}", acos(up.z), w.phase.name());
     }
     let near = |at: nalgebra::Vector3<f64>, [x, y, z]: [f64; 3]| {
         assert!((at - nalgebra::Vector3::new(x, y, z)).norm() < IN_PLACE_M, "{at} for {x} {y} {z}")
@@ -240,4 +243,52 @@ fn tables_hold_plans_exactly_and_refuse_what_is_none() {
     let mut missing = table.clone();
     missing.columns.retain(|c| c.name != "finger_3.dq_rad_s");
     assert!(from_table(&missing).unwrap_err().contains("finger_3.dq_rad_s"));
+}
+
+/// A wall too high to pass over or around: the search would go on for minutes.
+#[test]
+fn an_interrupt_ends_a_search_within_a_second() {
+    let interrupt = Interrupt::default();
+    let settings = PlanSettings { search_iterations: 100_000, shortcut_iterations: 100_000, ..PlanSettings::default() };
+    let mut planner = Planner::new(&settings).with_interrupt(&interrupt);
+    let mut scene = over_the_wall(0, 2.0);
+    scene.obstacles[0].size_m[0] = 1.4;
+    scene.obstacles[0].center_m[0] = 0.9;
+    let raise = interrupt.clone();
+    let raised = std::thread::spawn(move || {
+        std::thread::sleep(std::time::Duration::from_millis(300));
+        raise.raise(2);
+        std::time::Instant::now()
+    });
+    assert!(plan(&mut planner, &scene, 0).is_err(), "there is no way through");
+    let ended = std::time::Instant::now();
+    assert!(ended.saturating_duration_since(raised.join().expect("raises")).as_secs_f64() < 1.0);
+}
+
+/// Such plans took all memory there was.
+#[test]
+fn a_plan_that_nothing_could_execute_is_given_up() {
+    for (speed, max_acceleration_rad_s2) in [(1e-5, 3.0), (0.8, 1e-300), (1e-300, 1e-300), (1e-3, 3.0)] {
+        let mut planner = Planner::new(&PlanSettings { speed, max_acceleration_rad_s2, ..PlanSettings::default() });
+        let why = plan(&mut planner, &scene(Task::Stack, 0), 0).expect_err("too long").to_string();
+        assert!(why.contains("simulate.max_steps can allow no more than 10000") && why.contains("raise plan.speed"), "{why}");
+    }
+}
+
+/// What touches the arm before it has moved breaks the simulation down.
+#[test]
+fn a_box_that_touches_the_arm_where_it_begins_is_refused_and_one_beside_it_is_not() {
+    let with = |center_m, size_m| {
+        check_ready_pose(&SceneSettings { obstacles: vec![Obstacle { center_m, size_m }], ..SceneSettings::default() })
+    };
+    for (center, size, link) in [
+        ([0.0, 0.0, 0.3], [0.02; 3], "link_1"),
+        ([0.0, 0.0, 0.05], [0.3, 0.3, 0.02], "link_base"),
+        ([0.0, 0.0, 0.0], [4.0; 3], "link_base"),
+    ] {
+        let said = with(center, size).expect_err("touches").to_string();
+        assert!(said.contains("scene.obstacles[0]") && said.contains(link) && said.contains("move the box"), "{said}");
+    }
+    assert!(with([0.45, 0.0, 0.05], [0.3, 0.02, 0.1]).is_ok());
+    assert!(with([-0.4, 0.0, 0.5], [0.02, 1.0, 1.0]).is_ok());
 }

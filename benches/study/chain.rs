@@ -168,10 +168,10 @@ fn episodes(root: &Path) -> Result<u64> {
 
 /// Updates of all stages of a training: each stage counts from 1, so the last of each.
 fn updates(policy: &Done) -> Result<u64> {
-    let (table, _) = table_file::read(&policy.dir.join("training.parquet"))?;
+    let (table, _) = table_file::read(&policy.dir.join("policy.training.parquet"))?;
     let columns = (table.column("stage").map(|c| &c.values), table.column("updates").map(|c| &c.values));
     let (Some(Values::Text(stages)), Some(Values::I64(updates))) = columns else {
-        anyhow::bail!("{}: training.parquet counts no updates", policy.dir.display());
+        anyhow::bail!("{}: policy.training.parquet counts no updates", policy.dir.display());
     };
     let last_of_stage = |i: &usize| stages.get(i + 1).is_none_or(|next| *next != stages[*i]);
     Ok((0..stages.len()).filter(last_of_stage).map(|i| updates[i].max(0) as u64).sum())

@@ -1,22 +1,17 @@
 //! The checkpoint of training as a file beside its result.
 
 use super::Console;
+use super::differences::differences;
 use crate::data::{Provenance, weights};
 use crate::error::{Error, Result};
 use crate::learn::Checkpoint;
-use serde_json::{Map, Value};
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
-/// What stands in place of the result's extension.
-const EXTENSION: &str = "checkpoint.safetensors";
+/// What a checkpoint's name has in place of the ending of the weights that it is for.
+pub const ENDING: &str = "checkpoint.safetensors";
 /// Parts of a provenance, in the order in which two are compared.
 const PARTS: [&str; 7] = ["hilt_version", "schema_version", "stage", "task", "seed", "settings", "inputs"];
-
-/// Where the checkpoint of the weights `out` stands.
-pub fn place(out: &Path) -> PathBuf {
-    out.with_extension(EXTENSION)
-}
 
 /// Reads the checkpoint at `path`; `None` when there is none.
 ///
@@ -44,32 +39,13 @@ pub fn read(path: &Path, ours: &Provenance) -> Result<Option<Checkpoint>> {
 
 /// The first key in which two provenances differ, and both values.
 fn first_difference(theirs: &Provenance, ours: &Provenance) -> Option<(String, String, String)> {
-    let fields = |provenance: &Provenance| {
-        let value = serde_json::to_value(provenance).expect("a provenance has string keys only");
-        PARTS.map(|part| {
-            let mut found = Vec::new();
-            let name = if part == "settings" { "" } else { part };
-            flatten(name, &value[part], &mut found);
-            Map::from_iter(found)
-        })
-    };
-    let missing = Value::from("missing");
-    fields(theirs).iter().zip(&fields(ours)).find_map(|(theirs, ours)| {
-        let key = theirs.keys().chain(ours.keys()).find(|key| theirs.get(*key) != ours.get(*key))?;
-        let text = |map: &Map<String, Value>| map.get(key).unwrap_or(&missing).to_string();
-        Some((key.clone(), text(theirs), text(ours)))
-    })
-}
-
-/// Objects as dotted keys.
-fn flatten(name: &str, value: &Value, out: &mut Vec<(String, Value)>) {
-    match value {
-        Value::Object(fields) => fields.iter().for_each(|(key, value)| {
-            let name = if name.is_empty() { key.clone() } else { format!("{name}.{key}") };
-            flatten(&name, value, out);
-        }),
-        other => out.push((name.into(), other.clone())),
-    }
+    let value = |provenance: &Provenance| serde_json::to_value(provenance).expect("a provenance has string keys only");
+    let (theirs, ours) = (value(theirs), value(ours));
+    let found = PARTS.iter().find_map(|part| {
+        let name = if *part == "settings" { "" } else { part };
+        differences(name, &theirs[*part], &ours[*part]).into_iter().next()
+    });
+    found.map(|found| (found.key, found.theirs.to_string(), found.ours.to_string()))
 }
 
 /// Keeps the checkpoint of one run.

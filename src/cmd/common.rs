@@ -1,8 +1,10 @@
 //! The flags that all stages share: which settings, which seed.
 
+use super::places::Places;
 use crate::config::{Pipeline, Preset, Source, Stage};
-use crate::data::Provenance;
+use crate::data::{ContentHash, Provenance};
 use crate::error::{Error, Result};
+use crate::plan::check_ready_pose;
 use crate::tasks::Task;
 use std::path::{Path, PathBuf};
 
@@ -36,6 +38,11 @@ pub struct SettingsArgs {
 pub type Flag<'a> = (&'a str, Option<String>);
 
 impl SettingsArgs {
+    /// What these settings are read from, where that is a file.
+    pub fn places(&self) -> Places {
+        Places::new().read_all(self.pipeline.as_deref())
+    }
+
     /// The resolved settings; `flags` are dotted keys with the values of the stage's own flags, where given.
     ///
     /// # Errors
@@ -53,16 +60,18 @@ impl SettingsArgs {
             flags.iter().filter_map(|(key, value)| value.as_ref().map(|v| (format!("{key}={v}"), flag_text(key, v)))).collect();
         let mut sets = split(self.sets.as_deref().unwrap_or_default());
         sets.extend(self.set.iter().chain(given.iter().map(|(set, _)| set)).cloned());
-        Pipeline::load(&source, &sets).map_err(|e| in_words_of_flags(e, &given))
+        let pipeline = Pipeline::load(&source, &sets).map_err(|e| in_words_of_flags(e, &given))?;
+        check_ready_pose(&pipeline.scene)?;
+        Ok(pipeline)
     }
 
-    /// What made an artefact of `stage`: the settings it reads, the seed, the hashes of its inputs by role ("plans", "dataset").
+    /// What made an artefact of `stage`: the settings it reads, the seed, the hashes of what it has read by role ("plans", "dataset").
     ///
     /// # Errors
-    /// [`Error::Io`] when an input cannot be read.
-    pub fn provenance(&self, stage: Stage, pipeline: &Pipeline, inputs: &[(&str, &Path)]) -> Result<Provenance> {
+    /// [`Error::Failed`] when a setting has no form in JSON.
+    pub fn provenance(&self, stage: Stage, pipeline: &Pipeline, inputs: &[(&str, ContentHash)]) -> Result<Provenance> {
         let provenance = Provenance::new(stage.name(), pipeline.task, pipeline.to_json(stage)?, self.seed);
-        inputs.iter().try_fold(provenance, |provenance, (role, path)| provenance.with_input(role, path))
+        Ok(inputs.iter().fold(provenance, |provenance, (role, content)| provenance.with_input(role, content)))
     }
 }
 

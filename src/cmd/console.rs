@@ -1,12 +1,13 @@
 //! Words and progress on stderr: bars on a terminal, plain lines otherwise; with `--log`, the plain lines in a file as well.
 
 use crate::error::{Error, Result};
+use crate::interrupt;
 use indicatif::{MultiProgress, ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::fs::File;
 use std::io::{IsTerminal, Write, stderr};
-use std::path::Path;
-use std::sync::Mutex;
+use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Mutex, OnceLock};
 use std::time::Instant;
 
 /// Plain progress lines per stage.
@@ -16,20 +17,38 @@ const PLAIN_LINES: u64 = 10;
 #[derive(Debug)]
 pub struct Console {
     quiet: bool,
-    log: Option<Mutex<File>>,
+    log_path: Option<PathBuf>,
+    /// A log that is there already is not emptied.
+    goes_on: bool,
+    /// Open once the command's places are checked: it may not be one of its inputs.
+    log: OnceLock<Mutex<File>>,
     bars: MultiProgress,
 }
 
 impl Console {
-    /// `quiet` keeps stderr for errors; `log` is created, with the directories above it; an old one is emptied, or `goes_on`.
-    ///
-    /// # Errors
-    /// [`Error::Io`] when the log cannot be created.
-    pub fn new(quiet: bool, log: Option<&Path>, goes_on: bool) -> Result<Self> {
+    /// `quiet` keeps stderr for errors; [`Console::open_log`] begins the log.
+    pub fn new(quiet: bool, log: Option<&Path>, goes_on: bool) -> Self {
         let show_bars = !quiet && stderr().is_terminal();
         let target = if show_bars { ProgressDrawTarget::stderr() } else { ProgressDrawTarget::hidden() };
-        let log = log.map(|path| open(path, goes_on)).transpose()?.map(Mutex::new);
-        Ok(Console { quiet, log, bars: MultiProgress::with_draw_target(target) })
+        let (log_path, log) = (log.map(Path::to_path_buf), OnceLock::new());
+        Console { quiet, log_path, goes_on, log, bars: MultiProgress::with_draw_target(target) }
+    }
+
+    /// Where the log is to be.
+    pub fn log_path(&self) -> Option<&Path> {
+        self.log_path.as_deref()
+    }
+
+    /// Creates the log, with the directories above it; an old one is emptied, or goes on.
+    ///
+    /// # Errors
+    /// [`Error::Io`] when it cannot be created.
+    pub fn open_log(&self) -> Result<()> {
+        if let Some(path) = &self.log_path {
+            let file = open(path, self.goes_on)?;
+            self.log.get_or_init(|| Mutex::new(file));
+        }
+        Ok(())
     }
 
     /// A line for people. Nobody is told when stderr or a full disk refuses it: words are no result.
@@ -43,7 +62,7 @@ impl Console {
     }
 
     fn to_log(&self, line: &str) {
-        if let Some(mut log) = self.log.as_ref().and_then(|log| log.lock().ok()) {
+        if let Some(mut log) = self.log.get().and_then(|log| log.lock().ok()) {
             let _ = writeln!(log, "{line}");
         }
     }
@@ -64,6 +83,7 @@ fn open(path: &Path, goes_on: bool) -> Result<File> {
     if let Some(parent) = path.parent() {
         std::fs::create_dir_all(parent).map_err(io)?;
     }
+    let _waits = interrupt::waiting();
     File::options().create(true).write(true).append(goes_on).truncate(!goes_on).open(path).map_err(io)
 }
 

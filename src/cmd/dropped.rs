@@ -26,9 +26,14 @@ pub fn keep<T>(stage: &str, items: Vec<Kept<T>>, advice: &str, console: &Console
         return Ok((kept, Outcome::Done));
     };
     if kept.is_empty() {
-        return Err(Error::Failed(format!("{stage}: all {total} episodes were dropped; the first: {first}; {advice}")));
+        let all = if total == 1 {
+            "the only episode was dropped".into()
+        } else {
+            format!("all {total} episodes were dropped; the first")
+        };
+        return Err(Error::Failed(format!("{stage}: {all}: {first}; {advice}")));
     }
-    console.say(&format!("{stage}: dropped {} of {total} episodes:", reasons.len()));
+    console.say(&format!("{stage}: left out {} of {total} episodes:", reasons.len()));
     reasons.iter().take(NAMED).for_each(|reason| console.say(&format!("  {reason}")));
     if reasons.len() > NAMED {
         console.say(&format!("  and {} more", reasons.len() - NAMED));

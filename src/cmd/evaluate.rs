@@ -1,11 +1,14 @@
 use super::common::{SettingsArgs, path_or, same_task};
-use super::{Context, Outcome, output, train};
+use super::differences::{Difference, differences};
+use super::places::{Content, Places, beside};
+use super::{Console, Context, Outcome, output, train};
 use crate::config::{Pipeline, Stage};
 use crate::data::provenance::Provenance;
-use crate::data::{atomic, json_file, recording, table_file, weights};
+use crate::data::{ContentHash, atomic, json_file, recording, table_file, weights};
 use crate::demo::Episode;
 use crate::error::{Error, Result};
 use crate::eval::{PolicyController, Rollouts, Summary, Trial, to_table};
+use crate::interrupt::Interrupt;
 use crate::learn::Policy;
 use crate::plan::Planner;
 use crate::report::table::text_table;
@@ -13,6 +16,9 @@ use crate::robot::urdf;
 use crate::scene::Scene;
 use crate::seed;
 use crate::sim::{Controller, Follower};
+use serde::Serialize;
+use serde_json::Value;
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -36,7 +42,7 @@ pub struct Args {
     /// Print the summary as JSON instead of a table
     #[arg(long)]
     json: bool,
-    /// Write the summary to this JSON file and the log of the episodes beside it, as .parquet
+    /// Write the summary to this JSON file and the log of the episodes beside it, <name>.episodes.parquet
     #[arg(long, value_name = "FILE.json")]
     out: Option<PathBuf>,
     /// Record every episode as MCAP into this directory
@@ -57,42 +63,92 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome> {
     let stochastic = ("evaluate.stochastic", args.stochastic.then(|| "true".to_string()));
     let pipeline = args.settings.resolve(&[episodes, stochastic])?;
     let path = path_or(args.policy.as_deref(), pipeline.task, "policy.safetensors");
-    let (subject, inputs) = match path.as_path() {
-        planner if planner == Path::new(PLANNER) => (Subject::Planner, vec![]),
-        file => (Subject::Policy(Arc::new(read_policy(file, &pipeline)?)), vec![("policy", file)]),
+    let log = args.out.as_deref().map(|out| beside(out, "episodes.parquet"));
+    args.places(&path, log.as_deref()).check(&context.console)?;
+    let (subject, inputs, trained) = match path.as_path() {
+        planner if planner == Path::new(PLANNER) => (Subject::Planner, vec![], None),
+        file => {
+            let (policy, made, content) = read_policy(file, &pipeline)?;
+            (Subject::Policy(Arc::new(policy)), vec![("policy", content)], Some(made.settings))
+        }
     };
     let horizon_steps = subject.horizon_steps(&pipeline);
     let mut provenance = args.settings.provenance(Stage::Evaluate, &pipeline, &inputs)?;
     provenance.settings["evaluate"]["horizon_steps"] = horizon_steps.into();
     provenance.settings["policy"] = if inputs.is_empty() { PLANNER } else { train::KIND }.into();
 
-    if let Some(out) = &args.out {
-        [out, &out.with_extension("parquet")].into_iter().try_for_each(|path| atomic::check_place(path))?;
-    }
+    let foreign = trained.map(|trained| of_scene(&trained, &provenance.settings)).unwrap_or_default();
+    say_of_scene(&foreign, &context.console);
     let rollouts = Rollouts::evaluation(&pipeline, args.settings.seed, horizon_steps);
     let trials = match &args.record {
         None => run_all(&rollouts, &subject, context, |_| Ok(()))?,
         Some(dir) => record_all(dir, &rollouts, &subject, context, &provenance)?,
     };
     let summary = Summary::of(pipeline.task, &trials);
-    if let Some(out) = &args.out {
-        let value = serde_json::to_value(&summary).map_err(|e| Error::Failed(format!("cannot write JSON: {e}")))?;
-        let log = out.with_extension("parquet");
+    let stated = Stated::new(&summary, &foreign);
+    if let (Some(out), Some(log)) = (&args.out, log) {
+        let value = serde_json::to_value(&stated).map_err(|e| Error::Failed(format!("cannot write JSON: {e}")))?;
         let table = table_file::encode(&log, &to_table(pipeline.task, &trials), &provenance)?;
         atomic::write_all(&[(log, table), (out.clone(), json_file::encode(out, &value, &provenance)?)])?;
     }
     if args.json {
-        output::print_json(&summary)?
+        output::print_json(&stated)?
     } else {
         output::print(&words(&summary, &trials))?
     }
     Ok(Outcome::Done)
 }
 
-fn read_policy(path: &Path, pipeline: &Pipeline) -> Result<Policy> {
-    let (tensors, meta, made) = weights::read(path, train::KIND)?;
+impl Args {
+    fn places(&self, policy: &Path, log: Option<&Path>) -> Places {
+        let mut places = self.settings.places().read_all(Some(policy).filter(|path| *path != Path::new(PLANNER)));
+        if let (Some(out), Some(log)) = (&self.out, log) {
+            places = places.write("--out", out, Content::Summary("evaluate"));
+            places = places.write("the log of the episodes", log, Content::Table("evaluate"));
+        }
+        match &self.record {
+            Some(dir) => places.write("--record", dir, Content::Recordings("evaluate")),
+            None => places,
+        }
+    }
+}
+
+fn read_policy(path: &Path, pipeline: &Pipeline) -> Result<(Policy, Provenance, ContentHash)> {
+    let (tensors, meta, made, content) = weights::read_hashed(path, train::KIND)?;
     same_task(path, made.task, pipeline.task)?;
-    Policy::from_tensors(&tensors, &meta).map_err(|why| Error::input(path, why))
+    Ok((Policy::from_tensors(&tensors, &meta).map_err(|why| Error::input(path, why))?, made, content))
+}
+
+/// Sections of the settings that make an episode what it is.
+const WORLD: [&str; 2] = ["scene", "simulate"];
+
+/// In what the episodes differ from those that the policy was trained for.
+fn of_scene(trained: &Value, here: &Value) -> Vec<Difference> {
+    WORLD.iter().flat_map(|section| differences(section, &trained[*section], &here[*section])).collect()
+}
+
+fn say_of_scene(foreign: &[Difference], console: &Console) {
+    for Difference { key, theirs, ours } in foreign {
+        console
+            .say(&format!("evaluate: {key} is {ours}, the policy was trained with {theirs}: another scene than it has learned"));
+    }
+}
+
+/// What scripts read.
+#[derive(Serialize)]
+struct Stated<'a> {
+    #[serde(flatten)]
+    summary: &'a Summary,
+    /// Where the scene is another than the policy was trained for: by key, \[trained, here\].
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    differs_from_training: BTreeMap<&'a str, [&'a Value; 2]>,
+}
+
+impl<'a> Stated<'a> {
+    fn new(summary: &'a Summary, foreign: &'a [Difference]) -> Self {
+        let differs_from_training = foreign.iter().map(|d| (d.key.as_str(), [&d.theirs, &d.ours])).collect();
+        Stated { summary, differs_from_training }
+    }
 }
 
 impl Subject {
@@ -106,11 +162,12 @@ impl Subject {
     }
 
     /// A controller for one episode; `None` when the demonstrator finds no plan.
-    fn controller(&self, rollouts: &Rollouts, index: u64, scene: &Scene) -> Option<Box<dyn Controller>> {
+    fn controller(&self, rollouts: &Rollouts, index: u64, scene: &Scene, interrupt: &Interrupt) -> Option<Box<dyn Controller>> {
         match self {
             Subject::Planner => {
                 let mut rng = seed::stream(rollouts.seed, "evaluate.search", index);
-                let plan = Planner::new(&rollouts.pipeline.plan).plan(index, scene, &mut rng).ok()?;
+                let mut planner = Planner::new(&rollouts.pipeline.plan).with_interrupt(interrupt);
+                let plan = planner.plan(index, scene, &mut rng).ok()?;
                 Some(Box::new(Follower::new(&plan)?))
             }
             Subject::Policy(policy) => {
@@ -127,7 +184,10 @@ where
     K: Fn(&Episode) -> Result<()> + Sync,
 {
     let progress = context.console.progress("evaluate", rollouts.episodes, "episodes");
-    let make = |index, scene: &Scene| Ok(subject.controller(rollouts, index, scene));
+    let make = |index, scene: &Scene| {
+        let controller = subject.controller(rollouts, index, scene, &context.interrupt);
+        context.interrupt.check().map(|()| controller)
+    };
     let trials = rollouts.run(make, &context.interrupt, |episode| {
         progress.step();
         episode.map_or(Ok(()), &keep)
@@ -145,9 +205,10 @@ fn record_all(
     provenance: &Provenance,
 ) -> Result<Vec<Trial>> {
     let (robot, mut trials) = (urdf(), Vec::new());
-    atomic::write_dir(dir, recording::is_file_name, |fresh| {
+    atomic::write_dir(dir, recording::is_file, |fresh| {
         trials = run_all(rollouts, subject, context, |episode| {
-            recording::write(&fresh.join(recording::file_name(episode.index)), episode, &robot, provenance)
+            let file = fresh.join(recording::file_name(episode.index));
+            atomic::write_new(&file, &recording::encode(&file, episode, &robot, provenance)?)
         })?;
         Ok(())
     })?;

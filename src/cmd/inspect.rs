@@ -1,3 +1,4 @@
+use super::places::Places;
 use super::{Context, Outcome, output};
 use crate::data;
 use crate::error::Result;
@@ -15,6 +16,7 @@ pub struct Args {
 }
 
 pub fn run(args: &Args, context: &Context) -> Result<Outcome> {
+    Places::new().read(&args.path).check(&context.console)?;
     let found = data::inspect(&args.path, &context.interrupt)?;
     if args.json {
         output::print_json(&found)?;

@@ -4,11 +4,13 @@ mod checkpoint;
 mod common;
 mod console;
 mod convert;
+mod differences;
 mod dropped;
 mod epochs;
 mod evaluate;
 mod inspect;
 mod output;
+mod places;
 mod plan;
 mod pretrain;
 mod render;
@@ -56,7 +58,7 @@ pub struct Context {
     name = "hilt",
     version,
     max_term_width = 100,
-    after_help = "Exit codes: 0 done, 1 failed, 2 wrong usage, 3 done but episodes were dropped, 130 interrupted.\n\
+    after_help = "Exit codes: 0 done, 1 failed, 2 wrong usage, 3 done but episodes were dropped, 130 interrupted (143 by SIGTERM).\n\
                   Results go to stdout, words and progress to stderr."
 )]
 pub struct Cli {
@@ -65,7 +67,7 @@ pub struct Cli {
     /// Worker threads; results do not depend on it [default: one per processor]
     #[arg(long, global = true, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     threads: Option<u16>,
-    /// Write words and wall times to this file too
+    /// Write words and wall times to this file too; its name ends in .log
     #[arg(long, global = true, value_name = "FILE")]
     log: Option<PathBuf>,
     /// Print errors only
@@ -101,7 +103,7 @@ impl Cli {
             .build_global()
             .map_err(|e| Error::Failed(format!("cannot start worker threads: {e}; try --threads 1")))?;
         let goes_on = matches!(&self.command, Command::Train(args) if args.resume);
-        let context = Context { console: Console::new(self.quiet, self.log.as_deref(), goes_on)?, interrupt };
+        let context = Context { console: Console::new(self.quiet, self.log.as_deref(), goes_on), interrupt };
         let started = Instant::now();
         let outcome = match &self.command {
             Command::Plan(args) => plan::run(args, &context),
@@ -112,9 +114,11 @@ impl Cli {
             Command::Evaluate(args) => evaluate::run(args, &context),
             Command::Inspect(args) => return inspect::run(args, &context),
             Command::Render(args) => render::run(args, &context),
-            Command::Settings(args) => return settings::run(args),
+            Command::Settings(args) => return settings::run(args, &context),
         };
-        context.console.say(&format!("wall time {:.1} s", started.elapsed().as_secs_f64()));
+        if outcome.is_ok() {
+            context.console.say(&format!("wall time {:.1} s", started.elapsed().as_secs_f64()));
+        }
         match outcome {
             Ok(Outcome::Dropped(_)) if self.allow_dropped => Ok(Outcome::Done),
             other => other,

@@ -1,13 +1,16 @@
 use super::common::{SettingsArgs, path_or};
 use super::epochs::Epochs;
-use super::{Context, Outcome, output};
+use super::places::{Content, beside};
+use super::{Context, Outcome, dropped, output};
 use crate::config::{Pipeline, SimulateSettings, Stage};
-use crate::data::{atomic, dataset, table_file, weights};
+use crate::data::{ContentHash, atomic, dataset, table_file, weights};
 use crate::demo::Demo;
 use crate::error::{Error, Result};
 use crate::learn::{EpochMetrics, pretrain_dynamics};
+use crate::tasks::FailureClass;
 use crate::{seed, sim};
 use rayon::prelude::*;
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 /// Kind of the weights that this stage writes.
@@ -21,7 +24,7 @@ pub struct Args {
     /// Directory with the datasets train and validation [default: runs/<TASK>/dataset]
     #[arg(long, value_name = "DIR")]
     dataset: Option<PathBuf>,
-    /// Weights to write, with their errors (same name, .parquet) and pretraining.parquet, the epochs, beside them [default: runs/<TASK>/dynamics.safetensors]
+    /// Weights to write, with <name>.errors.parquet and <name>.pretraining.parquet, their errors and the epochs, beside them [default: runs/<TASK>/dynamics.safetensors]
     #[arg(long, value_name = "FILE.safetensors")]
     out: Option<PathBuf>,
 }
@@ -30,13 +33,16 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome> {
     let pipeline = args.settings.resolve(&[])?;
     let dir = path_or(args.dataset.as_deref(), pipeline.task, "dataset");
     let out = path_or(args.out.as_deref(), pipeline.task, "dynamics.safetensors");
-    let (mut train, validation) = demos(&dir, &pipeline)?;
-    let provenance = args.settings.provenance(Stage::Pretrain, &pipeline, &[("dataset", &dir)])?;
-    let (errors, metrics) = (out.with_extension("parquet"), out.with_file_name("pretraining.parquet"));
-    [&errors, &metrics, &out].into_iter().try_for_each(|path| atomic::check_place(path))?;
+    let (errors, metrics) = (beside(&out, "errors.parquet"), beside(&out, "pretraining.parquet"));
+    let places = args.settings.places().read(&dir).write("--out", &out, Content::Weights(KIND, "pretrain"));
+    let places = places.write("the table of errors", &errors, Content::Table("pretrain"));
+    places.write("the table of epochs", &metrics, Content::Table("pretrain")).check(&context.console)?;
+    let Demos { mut train, validation, content } = demos(&dir, &pipeline)?;
+    let provenance = args.settings.provenance(Stage::Pretrain, &pipeline, &[("dataset", content)])?;
 
     let seed = args.settings.seed;
-    train.extend(reexecute(&train, &pipeline, seed, context)?);
+    let (again, outcome) = reexecute(&train, &pipeline, seed, context)?;
+    train.extend(again);
     let mut epochs = Epochs::new(&context.console);
     let mut log = |epoch: &EpochMetrics| epochs.step(epoch);
     let (dynamics, report) = pretrain_dynamics(&train, &validation, &pipeline.pretrain, seed, &mut log, &context.interrupt)?;
@@ -47,14 +53,17 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome> {
     let weights = weights::encode(&out, KIND, &dynamics.to_tensors(), &dynamics.meta(), &provenance)?;
     atomic::write_all(&[(errors, error_table), (metrics, metric_table), (out.clone(), weights)])?;
     context.console.say(&format!("pretrain: wrote {}", out.display()));
-    Ok(Outcome::Done)
+    Ok(outcome)
 }
 
-/// The demos' commands executed again in the simulator, `pretrain.reexecute` times each.
-fn reexecute(demos: &[Demo], pipeline: &Pipeline, seed: u64, context: &Context) -> Result<Vec<Demo>> {
+/// For when no command could be executed again.
+const ADVICE: &str = "change scene.obstacles, scene.friction or scene.block_mass_kg, or set pretrain.reexecute = 0";
+
+/// The demos' commands executed again in the simulator, `pretrain.reexecute` times each; without those in which it broke down.
+fn reexecute(demos: &[Demo], pipeline: &Pipeline, seed: u64, context: &Context) -> Result<(Vec<Demo>, Outcome)> {
     let times = pipeline.pretrain.reexecute;
     if times == 0 {
-        return Ok(Vec::new());
+        return Ok((Vec::new(), Outcome::Done));
     }
     let settings = SimulateSettings { pulses: pipeline.pretrain.reexecute_pulses.clone(), ..pipeline.simulate.clone() };
     let progress = context.console.progress("re-execute", times * demos.len() as u64, "episodes");
@@ -62,23 +71,43 @@ fn reexecute(demos: &[Demo], pipeline: &Pipeline, seed: u64, context: &Context) 
         context.interrupt.check()?;
         let demo = &demos[(index / times) as usize];
         let rng = seed::stream(seed, "pretrain.reexecute", index);
-        let episode = sim::reexecute(index, demo, &pipeline.scene, &settings, rng);
+        let episode = sim::reexecute(index, demo, &pipeline.scene, &settings, rng, &context.interrupt)?;
         progress.step();
-        episode.to_demo().map_err(|why| Error::Failed(format!("training demo {} executed again: {why}", index / times)))
+        let what = format!("training demo {}", index / times);
+        match episode.failure {
+            Some(class @ (FailureClass::SimulationBrokeDown | FailureClass::CommandNotFinite)) => {
+                Ok(Err(format!("{what}: {}", class.words())))
+            }
+            _ => episode.to_demo().map(Ok).map_err(|why| Error::Failed(format!("{what} executed again: {why}"))),
+        }
     });
-    let again = again.collect::<Result<_>>()?;
+    let again = again.collect::<Result<Vec<dropped::Kept<Demo>>>>()?;
     progress.finish("");
-    Ok(again)
+    dropped::keep("re-execute", again, ADVICE, &context.console)
+}
+
+/// What is learned from, and on what it is judged.
+pub struct Demos {
+    pub train: Vec<Demo>,
+    pub validation: Vec<Demo>,
+    /// Of both datasets, as they were read.
+    pub content: ContentHash,
 }
 
 /// Training and validation demos.
 ///
 /// # Errors
-/// What reading returns; [`Error::Input`] when there is no validation demo: a dataset of one episode has none.
-pub fn demos(dir: &Path, pipeline: &Pipeline) -> Result<(Vec<Demo>, Vec<Demo>)> {
-    let train = dataset::read_for(&dir.join(dataset::TRAIN), pipeline.task)?.demos;
-    let root = dir.join(dataset::VALIDATION);
-    let validation = if root.exists() { dataset::read_for(&root, pipeline.task)?.demos } else { Vec::new() };
+/// What reading returns; [`Error::Input`] when there is no validation demo (a dataset of one episode has none), or when one is a training
+/// demo too.
+pub fn demos(dir: &Path, pipeline: &Pipeline) -> Result<Demos> {
+    let mut files = BTreeMap::new();
+    let mut read = |name: &str| -> Result<Vec<Demo>> {
+        let found = dataset::read_for(&dir.join(name), pipeline.task)?;
+        files.extend(found.files.into_iter().map(|(file, hash)| (format!("{name}/{file}"), hash)));
+        Ok(found.demos)
+    };
+    let train = read(dataset::TRAIN)?;
+    let validation = if dir.join(dataset::VALIDATION).exists() { read(dataset::VALIDATION)? } else { Vec::new() };
     if validation.is_empty() {
         let (count, ratio) = (train.len(), pipeline.convert.train_per_validation);
         return Err(Error::input(
@@ -89,5 +118,13 @@ pub fn demos(dir: &Path, pipeline: &Pipeline) -> Result<(Vec<Demo>, Vec<Demo>)> 
             ),
         ));
     }
-    Ok((train, validation))
+    if let Some((t, v)) = dataset::first_shared(&train, &validation) {
+        let message = format!(
+            "training episode {t} is validation episode {v}, in every number: what is validated has been learned; run hilt convert again, \
+             over recordings of which none is there twice"
+        );
+        return Err(Error::input(dir, message));
+    }
+    let content = ContentHash::of_directory(files.iter().map(|(name, hash)| (name.as_str(), *hash)));
+    Ok(Demos { train, validation, content })
 }

@@ -1,3 +1,4 @@
+use super::places::{Content, Places};
 use super::{Context, Outcome};
 use crate::data::{atomic, recording};
 use crate::error::Result;
@@ -47,12 +48,12 @@ struct Format {
 }
 
 pub fn run(args: &Args, context: &Context) -> Result<Outcome> {
-    let (episode, _) = recording::read(&args.recording)?;
-    let ending = if args.format.gif { "gif" } else { "png" };
+    let (ending, content) = if args.format.gif { ("gif", Content::Gif) } else { ("png", Content::Png) };
     // Not beside the recording: a directory of recordings is an artefact of its own.
     let name = || Path::new(args.recording.file_name().unwrap_or_default()).with_extension(ending);
     let out = args.out.clone().unwrap_or_else(name);
-    atomic::check_place(&out)?;
+    Places::new().read(&args.recording).write("--out", &out, content).check(&context.console)?;
+    let (episode, _) = recording::read(&args.recording)?;
     let size = (args.width, args.height);
     let mut bytes = Vec::new();
     if args.format.gif {

@@ -1,5 +1,5 @@
 use super::common::SettingsArgs;
-use super::{Outcome, output};
+use super::{Context, Outcome, output};
 use crate::config::Stage;
 use crate::error::Result;
 
@@ -13,7 +13,8 @@ pub struct Args {
     stage: Option<Stage>,
 }
 
-pub fn run(args: &Args) -> Result<Outcome> {
+pub fn run(args: &Args, context: &Context) -> Result<Outcome> {
+    args.settings.places().check(&context.console)?;
     let pipeline = args.settings.resolve(&[])?;
     output::print(&format!("# seed {}\n{}", args.settings.seed, pipeline.to_toml(args.stage)?))?;
     Ok(Outcome::Done)

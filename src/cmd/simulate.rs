@@ -1,4 +1,5 @@
 use super::common::{SettingsArgs, path_or, same_task};
+use super::places::Content;
 use super::{Context, Outcome};
 use crate::config::Stage;
 use crate::data::{atomic, recording, table_file};
@@ -31,7 +32,8 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome> {
     let pipeline = args.settings.resolve(&[])?;
     let path = path_or(args.plans.as_deref(), pipeline.task, "plans.parquet");
     let out = path_or(args.out.as_deref(), pipeline.task, "recordings");
-    let (table, made) = table_file::read(&path)?;
+    args.settings.places().read(&path).write("--out", &out, Content::Recordings("simulate")).check(&context.console)?;
+    let (table, made, content) = table_file::read_hashed(&path)?;
     same_task(&path, made.task, pipeline.task)?;
     let mut plans = from_table(&table).map_err(|why| Error::input(&path, why))?;
     plans.truncate(args.episodes.map_or(usize::MAX, |n| n as usize));
@@ -39,7 +41,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome> {
         return Err(Error::input(&path, "holds no plan; run `hilt plan` again"));
     }
     let robot = urdf();
-    let provenance = args.settings.provenance(Stage::Simulate, &pipeline, &[("plans", &path)])?;
+    let provenance = args.settings.provenance(Stage::Simulate, &pipeline, &[("plans", content)])?;
 
     let progress = context.console.progress("simulate", plans.len() as u64, "episodes");
     let (solved, steps) = (AtomicU64::new(0), AtomicU64::new(0));
@@ -49,14 +51,16 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome> {
         let mut disturbance = Disturbance::new(&pipeline.simulate, noise);
         let unusable = || Error::input(&path, format!("plan {} has no approach or no carry; run `hilt plan` again", plan.index));
         let mut follower = Follower::new(plan).ok_or_else(unusable)?;
-        let episode = run_episode(plan.index, &plan.scene, &mut follower, &mut disturbance, pipeline.simulate.max_steps);
+        let max_steps = pipeline.simulate.max_steps;
+        let episode = run_episode(plan.index, &plan.scene, &mut follower, &mut disturbance, max_steps, &context.interrupt)?;
         solved.fetch_add(u64::from(episode.success), Ordering::Relaxed);
         steps.fetch_add(episode.steps.len() as u64, Ordering::Relaxed);
-        recording::write(&dir.join(recording::file_name(plan.index)), &episode, &robot, &provenance)?;
+        let file = dir.join(recording::file_name(plan.index));
+        atomic::write_new(&file, &recording::encode(&file, &episode, &robot, &provenance)?)?;
         progress.step();
         Ok(())
     };
-    atomic::write_dir(&out, recording::is_file_name, |dir| plans.par_iter().try_for_each(|plan| record(plan, dir)))?;
+    atomic::write_dir(&out, recording::is_file, |dir| plans.par_iter().try_for_each(|plan| record(plan, dir)))?;
     progress.finish(&format!(", {} control steps, {} solved", steps.into_inner(), solved.into_inner()));
     context.console.say(&format!("simulate: wrote {}", out.display()));
     Ok(Outcome::Done)

@@ -1,9 +1,10 @@
 use super::checkpoint::{self, Keeper};
 use super::common::{SettingsArgs, path_or, same_task};
 use super::epochs::Epochs;
+use super::places::{Content, beside};
 use super::{Console, Context, Outcome, pretrain};
 use crate::config::{Pipeline, Stage};
-use crate::data::{atomic, table_file, weights};
+use crate::data::{ContentHash, atomic, table_file, weights};
 use crate::error::{Error, Result};
 use crate::eval::{PolicyController, Rollouts};
 use crate::interrupt::Interrupt;
@@ -11,6 +12,7 @@ use crate::learn::{Checkpoint, Dynamics, Hooks, Method, Policy, Selection, train
 use crate::scene::Scene;
 use crate::sim::Controller;
 use crate::tasks::Task;
+use crate::words::did_you_mean;
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -42,10 +44,10 @@ pub struct Args {
     /// Weights to write [default: runs/<TASK>/policy.safetensors]
     #[arg(long, value_name = "FILE.safetensors")]
     out: Option<PathBuf>,
-    /// Metrics per epoch to write [default: training.parquet beside the weights]
+    /// Metrics per epoch to write [default: beside the weights, their name with .training.parquet]
     #[arg(long, value_name = "FILE.parquet")]
     metrics: Option<PathBuf>,
-    /// Continue an interrupted run of the same settings from its checkpoint, <OUT>.checkpoint.safetensors; the log goes on too
+    /// Continue an interrupted run of the same settings from its checkpoint beside the weights, <name>.checkpoint.safetensors; the log goes on too
     #[arg(long)]
     pub resume: bool,
     /// Time between two checkpoints; 0 = only when training is interrupted
@@ -59,15 +61,18 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome> {
     let dir = path_or(args.dataset.as_deref(), pipeline.task, "dataset");
     let model = path_or(args.dynamics.as_deref(), pipeline.task, "dynamics.safetensors");
     let out = path_or(args.out.as_deref(), pipeline.task, "policy.safetensors");
-    let metrics = args.metrics.clone().unwrap_or_else(|| out.with_file_name("training.parquet"));
-    let (demos, validation) = pretrain::demos(&dir, &pipeline)?;
+    let metrics = args.metrics.clone().unwrap_or_else(|| beside(&out, "training.parquet"));
     let needs_model = args.method != Method::Bc || args.dynamics.is_some();
-    let dynamics = needs_model.then(|| read_dynamics(&model, pipeline.task)).transpose()?;
-    let all = [("dataset", dir.as_path()), ("dynamics", model.as_path())];
-    let inputs = if needs_model { &all[..] } else { &all[..1] };
-    let mut provenance = args.settings.provenance(Stage::Train, &pipeline, inputs)?;
-    let kept = checkpoint::place(&out);
-    [&metrics, &out, &kept].into_iter().try_for_each(|path| atomic::check_place(path))?;
+    let kept = beside(&out, checkpoint::ENDING);
+    let places = args.settings.places().read(&dir).read_all(needs_model.then_some(model.as_path()));
+    let places =
+        places.write("--out", &out, Content::Weights(KIND, "train")).write("--metrics", &metrics, Content::Table("train"));
+    let checkpoint = if args.resume { Content::Own } else { Content::Weights(weights::CHECKPOINT, "train") };
+    places.write("the checkpoint", &kept, checkpoint).check(&context.console)?;
+    let pretrain::Demos { train: demos, validation, content } = pretrain::demos(&dir, &pipeline)?;
+    let (dynamics, model) = needs_model.then(|| read_dynamics(&model, pipeline.task)).transpose()?.unzip();
+    let inputs: Vec<_> = [("dataset", content)].into_iter().chain(model.map(|content| ("dynamics", content))).collect();
+    let mut provenance = args.settings.provenance(Stage::Train, &pipeline, &inputs)?;
     provenance.settings["method"] = format!("{:?}", args.method).to_lowercase().into();
 
     let (console, seed) = (&context.console, args.settings.seed);
@@ -127,10 +132,10 @@ fn stated(selection: &Selection, episodes: u64, seed: u64) -> Value {
     json!({ "episodes": episodes, "seed": seed, "candidates": selection.candidates, "chosen": selection.best() })
 }
 
-fn read_dynamics(path: &Path, task: Task) -> Result<Dynamics> {
-    let (tensors, meta, made) = weights::read(path, pretrain::KIND)?;
+fn read_dynamics(path: &Path, task: Task) -> Result<(Dynamics, ContentHash)> {
+    let (tensors, meta, made, content) = weights::read_hashed(path, pretrain::KIND)?;
     same_task(path, made.task, task)?;
-    Dynamics::from_tensors(&tensors, &meta).map_err(|why| Error::input(path, why))
+    Ok((Dynamics::from_tensors(&tensors, &meta).map_err(|why| Error::input(path, why))?, content))
 }
 
 fn method(name: &str) -> std::result::Result<Method, String> {
@@ -138,6 +143,9 @@ fn method(name: &str) -> std::result::Result<Method, String> {
         "hil" => Ok(Method::Hil),
         "bc" => Ok(Method::Bc),
         "sc" => Ok(Method::Sc),
-        _ => Err(format!("unknown method \"{name}\"; allowed: hil (both losses), bc (behavior cloning), sc (state cloning)")),
+        _ => {
+            let hint = did_you_mean(name, ["hil", "bc", "sc"]);
+            Err(format!("unknown method \"{name}\"{hint}; allowed: hil (both losses), bc (behavior cloning), sc (state cloning)"))
+        }
     }
 }

@@ -5,18 +5,27 @@ use super::{Pipeline, SceneSettings, Spread};
 use crate::error::{Error, Result};
 use crate::scene::Obstacle;
 use crate::tasks::Task;
+use crate::words::{did_you_mean, distance, near, shown};
 use toml::{Table, Value};
+
+/// A longer key is no slip of the finger, and takes long to compare.
+const LONGEST_KEY: usize = 64;
+/// Boxes of a scene: each is kept with every episode, and met by every distance of a plan.
+const MOST_OBSTACLES: usize = 100;
+/// Letters of a reason that are kept at each end.
+const KEPT_OF_REASON: usize = 120;
 
 /// A table as checked settings; `origin` says in an error where they were written.
 pub(super) fn resolve(table: Table, origin: &str) -> Result<Pipeline> {
     unknown_keys(&table, origin)?;
     let pipeline: Pipeline = serde_path_to_error::deserialize(Value::Table(table.clone())).map_err(|e| {
         let key = plain_key(&e.path().to_string());
-        let value = find(&table, &key).map_or(String::new(), |v| format!(" = {v}"));
+        let value = find(&table, &key).map_or(String::new(), |v| format!(" = {}", shown(&v.to_string())));
         let allowed = Range::of(&key).map_or(String::new(), |r| format!("; allowed: {r}"));
         let reason = e.inner().to_string();
         let reason = reason.lines().next().unwrap_or_default();
-        Error::Usage(format!("{origin}: {}{value}: {reason}{allowed}", e.path()))
+        let hint = meant_variant(reason);
+        Error::Usage(format!("{origin}: {}{value}: {}{hint}{allowed}", e.path(), shortened(reason)))
     })?;
     for (key, value) in leaves(&pipeline.to_table()?) {
         if let Some(range) = Range::of(&key) {
@@ -25,6 +34,10 @@ pub(super) fn resolve(table: Table, origin: &str) -> Result<Pipeline> {
     }
     for learning in [pipeline.pretrain.validate(), pipeline.train.validate()] {
         learning.map_err(|why| Error::Usage(format!("{origin}: {why}")))?;
+    }
+    let boxes = pipeline.scene.obstacles.len();
+    if boxes > MOST_OBSTACLES {
+        return Err(Error::Usage(format!("{origin}: scene.obstacles has {boxes} boxes; allowed: up to {MOST_OBSTACLES}")));
     }
     all_ordered(&pipeline.scene, origin)?;
     Ok(pipeline)
@@ -62,22 +75,54 @@ fn unknown_keys(table: &Table, origin: &str) -> Result<()> {
     let known = known_keys();
     for (key, _) in leaves(table) {
         if !known.contains(&key) && !known.iter().any(|k| k.starts_with(&format!("{key}."))) {
-            let hint = nearest(&key).map_or(String::new(), |known| format!("; did you mean {known}?"));
+            let (key, hint) = (shown(&key), hint(&key));
             return Err(Error::Usage(format!("{origin}: unknown key {key}{hint} (`hilt settings` prints all keys)")));
         }
     }
     Ok(())
 }
 
-/// The known dotted key that looks most like `key`: by its full name, or by its last part alone.
-pub(super) fn nearest(key: &str) -> Option<String> {
+/// `; did you mean plan.speed?`, or nothing when no known key is near.
+pub(super) fn hint(key: &str) -> String {
+    nearest(key).map_or(String::new(), |known| format!("; did you mean {known}?"))
+}
+
+/// The known dotted key or section that was meant, if one is near: by its full name, or by its last part alone.
+fn nearest(key: &str) -> Option<String> {
+    if key.len() > LONGEST_KEY {
+        return None;
+    }
     let last = |k: &str| k.rsplit('.').next().unwrap_or_default().to_string();
     let mut known = known_keys();
     known.extend(known_sections());
-    known.into_iter().min_by_key(|k| {
-        let full = strsim::damerau_levenshtein(k, key);
-        full.min(strsim::damerau_levenshtein(&last(k), &last(key)) + 1)
-    })
+    let apart = |k: &str| {
+        let (full, part) = (distance(k, key), distance(&last(k), &last(key)));
+        let meant = near(full, k.len()) || near(part, last(k).len());
+        meant.then_some(full.min(part + 1))
+    };
+    let candidates = known.into_iter().filter_map(|k| Some((apart(&k)?, k)));
+    candidates.min_by_key(|(apart, _)| *apart).map(|(_, k)| k)
+}
+
+/// From ``unknown variant `tan`, expected `tanh` or `relu` ``: which one was meant.
+fn meant_variant(reason: &str) -> String {
+    let mut names = reason.split('`').skip(1).step_by(2);
+    match names.next() {
+        Some(given) if reason.starts_with("unknown variant") => did_you_mean(given, names),
+        _ => String::new(),
+    }
+}
+
+/// A reason that repeats a long value, without its middle.
+fn shortened(reason: &str) -> String {
+    let letters: Vec<char> = reason.chars().collect();
+    match letters.len().checked_sub(2 * KEPT_OF_REASON) {
+        None | Some(0) => reason.into(),
+        Some(middle) => {
+            let [head, tail] = [&letters[..KEPT_OF_REASON], &letters[KEPT_OF_REASON + middle..]].map(String::from_iter);
+            format!("{head}...{tail}")
+        }
+    }
 }
 
 /// Every dotted key that a pipeline file may hold, found by writing out the defaults with one obstacle in them.

@@ -1,57 +1,37 @@
-//! What is allowed for the numbers of `[pretrain]` and `[train]`.
+//! What `[pretrain]` and `[train]` are held to beyond the range of each number.
 
+use super::check::leaves;
 use super::ranges::Range;
-use super::scene::PulseSettings;
 use crate::error::{Error, Result};
-use toml::Value;
+use serde::Serialize;
+use toml::{Table, Value};
 
 pub(super) fn refuse(key: &str, value: impl std::fmt::Display, allowed: &str) -> Result<()> {
     Err(Error::Usage(format!("{key} = {value} is not allowed; it must be {allowed}")))
 }
 
-pub(super) fn unit(key: &str, value: f64) -> Result<()> {
-    if (0.0..=1.0).contains(&value) { Ok(()) } else { refuse(key, value, "between 0 and 1") }
-}
-
-pub(super) fn positive(key: &str, value: f64) -> Result<()> {
-    if value > 0.0 && value.is_finite() { Ok(()) } else { refuse(key, value, "above 0 and finite") }
-}
-
-pub(super) fn at_least_one(key: &str, value: u64) -> Result<()> {
-    if value >= 1 { Ok(()) } else { refuse(key, value, "at least 1") }
-}
-
-/// Pulses have the ranges of `[simulate.pulses]`, wherever they stand.
-pub(super) fn pulses(key: &str, pulses: &PulseSettings) -> Result<()> {
-    let PulseSettings { probability, steps, sigma_rad_s } = pulses;
-    let entries =
-        [("probability", Value::from(*probability)), ("steps", i64::from(*steps).into()), ("sigma_rad_s", (*sigma_rad_s).into())];
-    entries.iter().try_for_each(|(name, value)| {
-        let range = Range::of(&format!("simulate.pulses.{name}")).expect("every number of a pulse has a range");
-        range.check(&format!("{key}.{name}"), value).map_err(Error::Usage)
+/// Every number of a section within its range.
+pub(super) fn within_ranges(section: &str, settings: &impl Serialize) -> Result<()> {
+    let table = Table::try_from(settings).map_err(|e| Error::Usage(format!("[{section}] cannot be written as TOML: {e}")))?;
+    let whole = Table::from_iter([(section.to_string(), Value::Table(table))]);
+    leaves(&whole).iter().try_for_each(|(key, value)| match Range::of(key) {
+        Some(range) if !range.holds(value) => refuse(key, value, &format!("from {range}")),
+        _ => Ok(()),
     })
 }
 
-/// Beyond these a network is a typing error.
-const MAX_LAYERS: usize = 16;
-const MAX_UNITS: usize = 4096;
+/// All weights of a stage's networks together: learning keeps some twenty arrays of that length, 400 MB.
+const MOST_WEIGHTS: usize = 5_000_000;
 
-pub(super) fn network(stage: &str, layers: usize, units: usize) -> Result<()> {
-    if !(1..=MAX_LAYERS).contains(&layers) {
-        return refuse(&format!("{stage}.hidden_layers"), layers, &format!("from 1 to {MAX_LAYERS}"));
+/// The hidden layers of `count` networks; inputs and outputs add little.
+pub(super) fn network(stage: &str, layers: usize, units: usize, count: usize) -> Result<()> {
+    let weights = (layers - 1) * units * units * count;
+    if weights <= MOST_WEIGHTS {
+        return Ok(());
     }
-    if !(1..=MAX_UNITS).contains(&units) {
-        return refuse(&format!("{stage}.hidden_units"), units, &format!("from 1 to {MAX_UNITS}"));
-    }
-    Ok(())
-}
-
-pub(super) fn optimiser(stage: &str, clip_norm: f64, ema_decay: f64) -> Result<()> {
-    if !(clip_norm >= 0.0 && clip_norm.is_finite()) {
-        return refuse(&format!("{stage}.clip_norm"), clip_norm, "0 (no limit) or above");
-    }
-    if !(0.0..1.0).contains(&ema_decay) {
-        return refuse(&format!("{stage}.ema_decay"), ema_decay, "at least 0 and below 1");
-    }
-    Ok(())
+    let key = format!("{stage}.hidden_layers = {layers} with {stage}.hidden_units = {units}");
+    let networks = if count > 1 { format!(" in {count} networks") } else { String::new() };
+    Err(Error::Usage(format!(
+        "{key}{networks} is not allowed: {weights} weights between hidden layers, {MOST_WEIGHTS} are the most"
+    )))
 }

@@ -1,10 +1,20 @@
 //! From a preset or a pipeline file and `--set` words to a checked [`Pipeline`].
 
+use super::ranges::Range;
 use super::{Pipeline, check};
 use crate::error::{Error, Result};
+use crate::interrupt;
 use crate::tasks::Task;
+use crate::words::{shown, unknown};
+use std::fs::File;
+use std::io::Read;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
+
+/// A pipeline file with every key is 4 kB long; this leaves room for comments and boxes [bytes].
+const LONGEST_FILE: u64 = 1 << 20;
+/// Parts of a dotted key: stage, section, key.
+const MOST_PARTS: usize = 3;
 
 /// The pipeline files that the binary carries, so that it works from any directory.
 const BUILT_IN: [(Task, Preset, &str); 6] = [
@@ -40,10 +50,7 @@ impl FromStr for Preset {
     type Err = String;
 
     fn from_str(s: &str) -> std::result::Result<Self, String> {
-        Preset::ALL
-            .into_iter()
-            .find(|p| p.name() == s)
-            .ok_or_else(|| format!("unknown preset \"{s}\"; allowed: {}", Preset::ALL.map(Preset::name).join(", ")))
+        Preset::ALL.into_iter().find(|p| p.name() == s).ok_or_else(|| unknown("preset", s, &Preset::ALL.map(Preset::name)))
     }
 }
 
@@ -73,22 +80,33 @@ impl Pipeline {
             }
             Source::File(path, task) => (path.display().to_string(), read(path)?, *task),
         };
-        let mut table: toml::Table = text
-            .parse()
-            .map_err(|e: toml::de::Error| Error::Usage(format!("{origin} is not valid TOML: {}", e.to_string().trim_end())))?;
+        let mut table: toml::Table = text.parse().map_err(|e: toml::de::Error| {
+            let why: Vec<String> = e.to_string().trim_end().lines().map(shown).collect();
+            Error::Usage(format!("{origin} is not valid TOML: {}", why.join("\n")))
+        })?;
         agree_on_task(&mut table, task, &origin)?;
         let mut pipeline = check::resolve(table.clone(), &origin)?;
         for set in sets {
-            apply(&mut table, set)?;
-            pipeline = check::resolve(table.clone(), &format!("--set {set}"))?;
+            let origin = format!("--set {}", shown(set));
+            apply(&mut table, set, &origin)?;
+            pipeline = check::resolve(table.clone(), &origin)?;
         }
         Ok(pipeline)
     }
 }
 
+/// Whatever stands at `path`, a pipe too, is read up to a limit.
 fn read(path: &Path) -> Result<String> {
-    let bytes = std::fs::read(path).map_err(|e| Error::io(path, "read", e))?;
-    String::from_utf8(bytes).map_err(|_| Error::Usage(format!("{} is not a pipeline file: it is not UTF-8 text", path.display())))
+    let io = |e| Error::io(path, "read", e);
+    let mut bytes = Vec::new();
+    let waits = interrupt::waiting();
+    File::open(path).map_err(io)?.take(LONGEST_FILE + 1).read_to_end(&mut bytes).map_err(io)?;
+    drop(waits);
+    let refuse = |why: String| Error::Usage(format!("{} is not a pipeline file: {why}", path.display()));
+    if bytes.len() as u64 > LONGEST_FILE {
+        return Err(refuse(format!("it is longer than {LONGEST_FILE} bytes")));
+    }
+    String::from_utf8(bytes).map_err(|_| refuse("it is not UTF-8 text".into()))
 }
 
 /// The file's task and the asked one must be the same; either may be missing, not both.
@@ -109,34 +127,68 @@ fn agree_on_task(table: &mut toml::Table, asked: Option<Task>, origin: &str) -> 
 }
 
 /// Puts one `stage.key=value` into the table. The value is TOML; what is not TOML is taken as text.
-fn apply(table: &mut toml::Table, set: &str) -> Result<()> {
+fn apply(table: &mut toml::Table, set: &str, origin: &str) -> Result<()> {
+    let refuse = |why: String| Err(Error::Usage(format!("{origin}: {why}")));
     let Some((key, value)) = set.split_once('=') else {
-        return Err(Error::Usage(format!("--set {set}: expected stage.key=value, for example --set plan.speed=0.5")));
+        return refuse("expected stage.key=value, for example --set plan.speed=0.5".into());
     };
     let (key, value) = (key.trim(), value.trim());
+    let count = key.split('.').count();
+    if count > MOST_PARTS {
+        return refuse(format!("a key of {count} parts; none has more than {MOST_PARTS} (`hilt settings` prints all keys)"));
+    }
     let parts: Vec<&str> = key.split('.').collect();
     if parts.len() < 2 || parts.iter().any(|p| p.is_empty()) {
-        let hint = check::nearest(key).map_or(String::new(), |known| format!("; did you mean {known}?"));
-        return Err(Error::Usage(format!("--set {set}: \"{key}\" is not a key of the form stage.key{hint}")));
+        return refuse(format!("\"{}\" is not a key of the form stage.key{}", shown(key), check::hint(key)));
     }
-    let value = parse_value(value);
+    let value = match parse_value(value) {
+        Ok(value) => value,
+        Err(why) => return refuse(format!("{key} = {}: {}", shown(value), why.words(key))),
+    };
     let (last, sections) = parts.split_last().expect("a key has at least two parts");
     let mut at = table;
     for section in sections {
         let entry = at.entry(*section).or_insert_with(|| toml::Value::Table(toml::Table::new()));
-        at = entry.as_table_mut().ok_or_else(|| {
-            let hint = check::nearest(key).map_or(String::new(), |known| format!("; did you mean {known}?"));
-            Error::Usage(format!("--set {set}: {section} is a value, not a section{hint}"))
-        })?;
+        let Some(inner) = entry.as_table_mut() else {
+            return refuse(format!("{section} is a value, not a section{}", check::hint(key)));
+        };
+        at = inner;
     }
     at.insert((*last).to_string(), value);
     Ok(())
 }
 
-fn parse_value(text: &str) -> toml::Value {
+/// Why a value is none.
+enum NoValue {
+    /// A number that no 64-bit number holds.
+    TooLarge,
+    /// It begins like a list, a table or a quoted text, but does not go on like one.
+    NotToml(String),
+}
+
+impl NoValue {
+    fn words(self, key: &str) -> String {
+        match self {
+            NoValue::TooLarge => {
+                let allowed = Range::of(key).map_or(String::new(), |range| format!("; allowed: {range}"));
+                format!("out of range{allowed}")
+            }
+            NoValue::NotToml(why) => format!("not valid TOML: {why}"),
+        }
+    }
+}
+
+fn parse_value(text: &str) -> std::result::Result<toml::Value, NoValue> {
     // A document of one line holds exactly one value: a line break or a comment would smuggle in more.
     match format!("value = {text}").parse::<toml::Table>() {
-        Ok(mut table) if table.len() == 1 => table.remove("value").unwrap_or_else(|| text.into()),
-        _ => text.into(),
+        Ok(mut table) if table.len() == 1 => Ok(table.remove("value").unwrap_or_else(|| text.into())),
+        Err(_) if is_integer(text) || text.parse().is_ok_and(f64::is_infinite) => Err(NoValue::TooLarge),
+        Err(why) if text.starts_with(['[', '{', '"', '\'']) => Err(NoValue::NotToml(why.message().into())),
+        _ => Ok(text.into()),
     }
+}
+
+fn is_integer(text: &str) -> bool {
+    let digits = text.trim_start_matches(['+', '-']);
+    !digits.is_empty() && digits.bytes().all(|b| b.is_ascii_digit())
 }

@@ -17,11 +17,13 @@ pub use choices::{
 pub use data::{ConvertSettings, EvaluateSettings};
 pub use load::{Preset, Source};
 pub use pretrain::PretrainSettings;
+pub use ranges::MOST_STEPS;
 pub use scene::{PlanSettings, PulseSettings, SceneSettings, SimulateSettings, Spread};
 pub use train::TrainSettings;
 
 use crate::error::{Error, Result};
 use crate::tasks::Task;
+use crate::words::unknown;
 use serde::{Deserialize, Serialize};
 use std::str::FromStr;
 
@@ -97,10 +99,7 @@ impl FromStr for Stage {
     type Err = String;
 
     fn from_str(s: &str) -> std::result::Result<Self, String> {
-        Stage::ALL
-            .into_iter()
-            .find(|stage| stage.name() == s)
-            .ok_or_else(|| format!("unknown stage \"{s}\"; allowed: {}", Stage::ALL.map(Stage::name).join(", ")))
+        Stage::ALL.into_iter().find(|stage| stage.name() == s).ok_or_else(|| unknown("stage", s, &Stage::ALL.map(Stage::name)))
     }
 }
 

@@ -1,18 +1,12 @@
 //! Settings of the dynamics network. Defaults are the preset `best`.
 
 use super::choices::{FeatureSet, ModelLoss, Structure};
-use super::limits::{at_least_one, network, optimiser, positive, pulses, refuse};
+use super::limits::{network, refuse, within_ranges};
+use super::ranges::MOST_EPOCHS;
 use super::scene::PulseSettings;
 use crate::error::Result;
 use crate::nn::Activation;
 use serde::{Deserialize, Serialize};
-
-/// More steps than any control task looks ahead.
-const MOST_STEPS: usize = 100;
-/// More networks than any ensemble needs.
-const MOST_NETWORKS: usize = 100;
-/// More executions of each demo than any dynamics network needs.
-const MOST_EXECUTIONS: u64 = 1000;
 
 /// `[pretrain]`: the dynamics network, Algorithm 4.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -82,21 +76,13 @@ impl PretrainSettings {
     /// # Errors
     /// [`crate::error::Error::Usage`] names the key, its value and what is allowed.
     pub fn validate(&self) -> Result<()> {
-        network("pretrain", self.hidden_layers, self.hidden_units)?;
-        at_least_one("pretrain.epochs", self.epochs)?;
-        if !(1..=MOST_STEPS).contains(&self.steps) {
-            return refuse("pretrain.steps", self.steps, &format!("from 1 to {MOST_STEPS}"));
+        within_ranges("pretrain", self)?;
+        network("pretrain", self.hidden_layers, self.hidden_units, self.ensemble)?;
+        let (epochs, networks) = (self.epochs, self.ensemble as u64);
+        if (epochs * networks) as f64 > MOST_EPOCHS {
+            return refuse("pretrain.epochs", epochs, &format!("at most {MOST_EPOCHS} over all {networks} networks"));
         }
-        if !(1..=MOST_NETWORKS).contains(&self.ensemble) {
-            return refuse("pretrain.ensemble", self.ensemble, &format!("from 1 to {MOST_NETWORKS}"));
-        }
-        if self.reexecute > MOST_EXECUTIONS {
-            return refuse("pretrain.reexecute", self.reexecute, &format!("from 0 to {MOST_EXECUTIONS}"));
-        }
-        pulses("pretrain.reexecute_pulses", &self.reexecute_pulses)?;
-        optimiser("pretrain", self.clip_norm, self.ema_decay)?;
-        positive("pretrain.learning_rate", self.learning_rate)?;
-        positive("pretrain.final_learning_rate", self.final_learning_rate)
+        Ok(())
     }
 }
 

@@ -1,8 +1,7 @@
 //! Settings of the policy. Defaults are the preset `best`; the literal preset of the paper sets the keys that differ.
 
 use super::choices::{ActionChoice, Alpha, Convergence, FeatureSet, FingerCloning, Objective, Pairs, StateScale};
-use super::limits::{at_least_one, network, optimiser, positive, pulses, refuse, unit};
-use super::ranges::MOST_EPISODES;
+use super::limits::{network, within_ranges};
 use super::scene::PulseSettings;
 use crate::error::{Error, Result};
 use crate::nn::Activation;
@@ -145,37 +144,11 @@ impl TrainSettings {
     /// # Errors
     /// [`Error::Usage`] names the key, its value and what is allowed.
     pub fn validate(&self) -> Result<()> {
-        network("train", self.hidden_layers, self.hidden_units)?;
-        if let Alpha::Fixed(alpha) = self.alpha {
-            unit("train.alpha", alpha)?;
-        }
-        unit("train.rho", self.rho)?;
-        unit("train.alpha_max", self.alpha_max)?;
-        unit("train.sc_noise_variance", self.sc_noise_variance)?;
-        if !(self.sc_knee >= 0.0 && self.sc_knee.is_finite()) {
-            return refuse("train.sc_knee", self.sc_knee, "0 (no knee) or above");
-        }
-        pulses("train.sc_pulses", &self.sc_pulses)?;
-        for (key, value) in [
-            ("train.tau", self.tau),
-            ("train.initial_std", self.initial_std),
-            ("train.std_floor", self.std_floor),
-            ("train.dynamics_learning_rate", self.dynamics_learning_rate),
-            ("train.warm_start_learning_rate", self.warm_start_learning_rate),
-            ("train.learning_rate", self.learning_rate),
-            ("train.final_learning_rate", self.final_learning_rate),
-        ] {
-            positive(key, value)?;
-        }
-        at_least_one("train.batch", self.batch as u64)?;
-        at_least_one("train.bc_batch", self.bc_batch as u64)?;
-        at_least_one("train.select_candidates", self.select_candidates)?;
-        if self.select_episodes as f64 > MOST_EPISODES {
-            return refuse("train.select_episodes", self.select_episodes, &format!("from 0 to {MOST_EPISODES}"));
-        }
+        within_ranges("train", self)?;
+        network("train", self.hidden_layers, self.hidden_units, 1)?;
         if self.epochs == 0 && self.warm_start_updates == 0 {
             return Err(Error::Usage("train.epochs and train.warm_start_updates are both 0: there is nothing to do".into()));
         }
-        optimiser("train", self.clip_norm, self.ema_decay)
+        Ok(())
     }
 }

@@ -7,7 +7,9 @@ pub mod atomic;
 pub mod dataset;
 mod inspect;
 pub mod json_file;
+mod litter;
 mod parquet_file;
+pub mod peek;
 mod proto;
 pub mod provenance;
 pub mod recording;
@@ -16,12 +18,14 @@ pub mod table_file;
 pub mod weights;
 
 pub use inspect::{inspect, inspect_text};
-pub use provenance::{Provenance, hash_path};
+pub use provenance::{ContentHash, Provenance};
 
 use crate::error::{Error, Result};
+use crate::interrupt;
 use std::path::Path;
 
 /// All bytes of a file.
 fn read_bytes(path: &Path) -> Result<Vec<u8>> {
+    let _waits = interrupt::waiting();
     std::fs::read(path).map_err(|e| Error::io(path, "read", e))
 }

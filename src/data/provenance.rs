@@ -5,8 +5,8 @@ use crate::error::{Error, Result};
 use crate::tasks::Task;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
-use std::fs;
-use std::path::{Path, PathBuf};
+use std::fmt;
+use std::path::Path;
 
 /// Version of the layout of all artefacts. It grows when a reader of the old layout would fail.
 pub const SCHEMA_VERSION: u32 = 1;
@@ -47,13 +47,10 @@ impl Provenance {
         }
     }
 
-    /// Adds a file or directory that the stage reads, under a name that is the same everywhere ("dataset/train").
-    ///
-    /// # Errors
-    /// See [`hash_path`].
-    pub fn with_input(mut self, name: &str, path: &Path) -> Result<Self> {
-        self.inputs.insert(name.into(), hash_path(path)?);
-        Ok(self)
+    /// Adds a file or directory that the stage has read, under a name that is the same everywhere ("dataset").
+    pub fn with_input(mut self, name: &str, content: &ContentHash) -> Self {
+        self.inputs.insert(name.into(), content.to_string());
+        self
     }
 
     /// One line of JSON, keys sorted within the settings.
@@ -82,41 +79,30 @@ impl Provenance {
     }
 }
 
-/// Content hash (BLAKE3, hexadecimal) of a file, or of a directory: names relative to it, sorted, each with its content. The
-/// place and the times of the files do not matter.
-///
-/// # Errors
-/// [`Error::Io`] when something cannot be read.
-pub fn hash_path(path: &Path) -> Result<String> {
-    if !path.is_dir() {
-        return hash_file(path).map(|h| h.to_hex().to_string());
-    }
-    let mut hash = blake3::Hasher::new();
-    for name in files_under(path)? {
-        let shown = name.to_string_lossy();
-        hash.update(&(shown.len() as u64).to_le_bytes()).update(shown.as_bytes());
-        hash.update(hash_file(&path.join(&name))?.as_bytes());
-    }
-    Ok(hash.finalize().to_hex().to_string())
-}
+/// What names bytes, wherever they are: their BLAKE3 hash, hexadecimal as text.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct ContentHash(blake3::Hash);
 
-fn hash_file(path: &Path) -> Result<blake3::Hash> {
-    let file = fs::File::open(path).map_err(|e| Error::io(path, "read", e))?;
-    let mut hash = blake3::Hasher::new();
-    hash.update_reader(file).map_err(|e| Error::io(path, "read", e))?;
-    Ok(hash.finalize())
-}
+impl ContentHash {
+    /// Of the bytes of a file.
+    pub fn of(bytes: &[u8]) -> Self {
+        ContentHash(blake3::hash(bytes))
+    }
 
-/// Paths of all files below `root`, relative to it, sorted.
-pub(super) fn files_under(root: &Path) -> Result<Vec<PathBuf>> {
-    let (mut found, mut open) = (Vec::new(), vec![PathBuf::new()]);
-    while let Some(inner) = open.pop() {
-        let dir = root.join(&inner);
-        for entry in fs::read_dir(&dir).map_err(|e| Error::io(&dir, "read", e))? {
-            let name = inner.join(entry.map_err(|e| Error::io(&dir, "read", e))?.file_name());
-            if root.join(&name).is_dir() { open.push(name) } else { found.push(name) }
+    /// Of a directory: its files' names, relative to it and sorted, each with the hash of its content.
+    pub fn of_directory<'a>(files: impl IntoIterator<Item = (&'a str, ContentHash)>) -> Self {
+        let files: BTreeMap<&str, ContentHash> = files.into_iter().collect();
+        let mut hash = blake3::Hasher::new();
+        for (name, content) in files {
+            hash.update(&(name.len() as u64).to_le_bytes()).update(name.as_bytes());
+            hash.update(content.0.as_bytes());
         }
+        ContentHash(hash.finalize())
     }
-    found.sort();
-    Ok(found)
+}
+
+impl fmt::Display for ContentHash {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.0.to_hex().as_str())
+    }
 }

@@ -1,6 +1,6 @@
 //! Tables (plans, metrics, evaluation logs) as Parquet; every column carries its description and unit in its own metadata.
 
-use super::{Provenance, atomic, parquet_file, read_bytes};
+use super::{ContentHash, Provenance, atomic, parquet_file, read_bytes};
 use crate::error::{Error, Result};
 use crate::table::{Column, Table, Values};
 use arrow_array::cast::AsArray;
@@ -71,7 +71,21 @@ pub fn encode(path: &Path, table: &Table, provenance: &Provenance) -> Result<Vec
 /// [`Error::Input`] when the file is missing its end, damaged, foreign or of another schema version, [`Error::Io`] when it
 /// cannot be read at all.
 pub fn read(path: &Path) -> Result<(Table, Provenance)> {
-    let (schema, batches) = parquet_file::open(path, read_bytes(path)?)?;
+    read_hashed(path).map(|(table, provenance, _)| (table, provenance))
+}
+
+/// As [`read`], with the hash of the bytes that were read.
+///
+/// # Errors
+/// As [`read`].
+pub fn read_hashed(path: &Path) -> Result<(Table, Provenance, ContentHash)> {
+    let bytes = read_bytes(path)?;
+    let hash = ContentHash::of(&bytes);
+    decode(path, bytes).map(|(table, provenance)| (table, provenance, hash))
+}
+
+fn decode(path: &Path, bytes: Vec<u8>) -> Result<(Table, Provenance)> {
+    let (schema, batches) = parquet_file::open(path, bytes)?;
     let provenance = parquet_file::provenance_of(path, &schema)?;
     let mut table = Table::default();
     for (i, field) in schema.fields().iter().enumerate() {

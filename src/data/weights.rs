@@ -1,7 +1,7 @@
 //! Network weights as safetensors. The header's only metadata key, `hilt`, holds JSON: kind, what is needed to run the network,
 //! the tensors' order, provenance and seal.
 
-use super::{Provenance, atomic, provenance, read_bytes, seal};
+use super::{ContentHash, Provenance, atomic, provenance, read_bytes, seal};
 use crate::error::{Error, Result};
 use crate::tensor::NamedTensor;
 use safetensors::SafeTensors;
@@ -74,11 +74,20 @@ pub fn encode(path: &Path, kind: &str, tensors: &[NamedTensor], meta: &Value, pr
 /// [`Error::Input`] when the file is cut short, damaged, foreign, of another kind or schema version, or holds a number that is not
 /// finite; [`Error::Io`] when it cannot be read at all.
 pub fn read(path: &Path, kind: &str) -> Result<(Vec<NamedTensor>, Value, Provenance)> {
-    let (found, tensors, meta, provenance) = read_any(path)?;
+    read_hashed(path, kind).map(|(tensors, meta, provenance, _)| (tensors, meta, provenance))
+}
+
+/// As [`read`], with the hash of the bytes that were read.
+///
+/// # Errors
+/// As [`read`].
+pub fn read_hashed(path: &Path, kind: &str) -> Result<(Vec<NamedTensor>, Value, Provenance, ContentHash)> {
+    let bytes = read_bytes(path)?;
+    let (found, tensors, meta, provenance) = decode(path, &bytes)?;
     if found != kind {
         return Err(Error::input(path, format!("holds the weights of a {}, a {} is needed", named(&found), named(kind))));
     }
-    Ok((tensors, meta, provenance))
+    Ok((tensors, meta, provenance, ContentHash::of(&bytes)))
 }
 
 fn named(kind: &str) -> String {
@@ -87,17 +96,20 @@ fn named(kind: &str) -> String {
 
 /// As [`read`], of any kind; the kind comes first.
 pub(super) fn read_any(path: &Path) -> Result<(String, Vec<NamedTensor>, Value, Provenance)> {
-    let bytes = read_bytes(path)?;
+    decode(path, &read_bytes(path)?)
+}
+
+fn decode(path: &Path, bytes: &[u8]) -> Result<(String, Vec<NamedTensor>, Value, Provenance)> {
     let invalid = |e| Error::input(path, format!("is no whole safetensors file: {e}"));
-    let file = SafeTensors::deserialize(&bytes).map_err(invalid)?;
-    let (_, metadata) = SafeTensors::read_metadata(&bytes).map_err(invalid)?;
+    let file = SafeTensors::deserialize(bytes).map_err(invalid)?;
+    let (_, metadata) = SafeTensors::read_metadata(bytes).map_err(invalid)?;
     let header = metadata.metadata().as_ref().and_then(|m| m.get(provenance::KEY));
     let header = header.ok_or_else(|| Error::input(path, "was not written by hilt: its header has no \"hilt\" key"))?;
     let header: Header =
         serde_json::from_str(header).map_err(|e| Error::input(path, format!("its header cannot be read: {e}")))?;
     let provenance = Provenance::from_value(path, header.provenance)?;
     let tensors = header.order.iter().map(|name| tensor(path, &file, name)).collect::<Result<Vec<_>>>()?;
-    seal::check(path, &bytes)?;
+    seal::check(path, bytes)?;
     Ok((header.kind, tensors, header.meta, provenance))
 }
 

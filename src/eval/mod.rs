@@ -125,10 +125,11 @@ impl<'a> Rollouts<'a> {
             .map(|index| {
                 interrupt.check()?;
                 let scene = self.scene(index)?;
-                let episode = make_controller(index, &scene)?.map(|mut controller| {
+                let run = |mut controller: Box<dyn Controller>| {
                     let mut disturbance = Disturbance::new(&settings, self.stream("noise", index));
-                    run_episode(index, &scene, controller.as_mut(), &mut disturbance, self.horizon_steps)
-                });
+                    run_episode(index, &scene, controller.as_mut(), &mut disturbance, self.horizon_steps, interrupt)
+                };
+                let episode = make_controller(index, &scene)?.map(run).transpose()?;
                 done(episode.as_ref())?;
                 Ok(episode.map_or_else(|| unplanned(index, scene), |episode| Trial::of(&episode)))
             })
@@ -154,7 +155,9 @@ fn unplanned(index: u64, scene: Scene) -> Trial {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::tasks::Task;
+    use crate::scene::Obstacle;
+    use crate::state::{Action, JOINTS};
+    use crate::tasks::{Observation, Task};
 
     #[test]
     fn selection_and_evaluation_share_no_episode() {
@@ -167,5 +170,30 @@ mod tests {
         assert!(selecting.iter().all(|scene| !evaluating.contains(scene)));
         let noise = |of: &Rollouts| of.stream("noise", 0).get_stream();
         assert_ne!(noise(&select), noise(&evaluate));
+    }
+
+    /// Asks for this in every step.
+    struct Constant(f64);
+
+    impl Controller for Constant {
+        fn command(&mut self, _seen: &Observation) -> Action {
+            [self.0; JOINTS]
+        }
+    }
+
+    /// The rollouts of a selection too: training goes on with a count of 0 instead of ending without its checkpoint.
+    #[test]
+    fn rollouts_that_break_down_or_ask_for_no_number_are_counted_by_their_class() {
+        let mut pipeline = Pipeline::defaults(Task::PickUp);
+        pipeline.train.select_episodes = 3;
+        let classes = |pipeline: &Pipeline, command: f64| {
+            let make = |_, _: &Scene| Ok(Some(Box::new(Constant(command)) as Box<dyn Controller>));
+            let trials = Rollouts::selection(pipeline, 3, 10).run(make, &Interrupt::default(), |_| Ok(()));
+            Summary::of(Task::PickUp, &trials.expect("no error")).failures
+        };
+        assert_eq!(classes(&pipeline, 0.0)["never_reached"], 3);
+        assert_eq!(classes(&pipeline, f64::NAN)["command_not_finite"], 3);
+        pipeline.scene.obstacles = vec![Obstacle { center_m: [0.0, 0.0, 0.3], size_m: [0.02; 3] }];
+        assert_eq!(classes(&pipeline, 0.0)["simulation_broke_down"], 3);
     }
 }

@@ -4,10 +4,11 @@ use super::corpus::{Samples, row};
 use super::policy::Policy;
 use super::shards;
 use crate::config::{ActionChoice, Convergence, Objective, TrainSettings};
+use crate::math::exp_f32;
 use crate::nn::{LANES, Lanes, Panels, Pass, gaussian, panels_of};
+use crate::seed::normal;
 use crate::state::JOINTS;
 use rand::Rng;
-use rand_distr::{Distribution, StandardNormal};
 use rayon::prelude::*;
 
 /// What Algorithm 2 returns.
@@ -97,7 +98,7 @@ pub fn behavior_cloning(policy: &Policy, batch: Batch, choices: &Choices, rng: &
 pub fn draw_noise(wanted: bool, rows: usize, rng: &mut impl Rng, noise: &mut Vec<f32>) {
     noise.clear();
     if wanted {
-        noise.extend((0..rows * JOINTS).map(|_| -> f32 { StandardNormal.sample(rng) }));
+        noise.extend((0..rows * JOINTS).map(|_| normal(rng) as f32));
     }
 }
 
@@ -123,7 +124,7 @@ impl Workspace {
 impl Shard {
     fn losses(&mut self, policy: &Policy, batch: Batch, rows: &[usize], noise: &[f32], choices: &Choices) {
         let unit = &policy.action_scaling().std;
-        let sigma: [f32; JOINTS] = std::array::from_fn(|i| policy.log_std[i].exp());
+        let sigma: [f32; JOINTS] = std::array::from_fn(|i| exp_f32(policy.log_std[i]));
         // L_BC = scale * sum over rows and entries of weight_i * (standardised error)^2
         let (weight, scale): ([f32; JOINTS], f32) = match choices.objective {
             Objective::RawSum => (std::array::from_fn(|i| unit[i] * unit[i]), 1.0 / batch.demos as f32),
@@ -164,7 +165,7 @@ impl Shard {
                         gaussian::sample_density(&policy.log_std, unit, &eps)
                     }
                     Convergence::Agreement => {
-                        f64::from((-0.5 * error2.0[lane] / (JOINTS as f32 * choices.tau * choices.tau)).exp())
+                        f64::from(exp_f32(-0.5 * error2.0[lane] / (JOINTS as f32 * choices.tau * choices.tau)))
                     }
                 };
             }

@@ -2,7 +2,7 @@
 
 use super::dynamics::Dynamics;
 use super::policy::Policy;
-use crate::demo::Demo;
+use crate::demo::{Demo, LARGEST_NUMBER};
 use crate::error::{Error, Result};
 use crate::state::{BASE_DIM, JOINTS};
 use crate::tasks::Task;
@@ -36,7 +36,7 @@ impl Corpus {
     /// Collects `demos`; `what` names them in errors ("training", "validation").
     ///
     /// # Errors
-    /// [`Error::Failed`] when there is no demo or tasks are mixed.
+    /// [`Error::Failed`] when there is no demo, tasks are mixed, or a number is beyond all measure: losses would be none.
     pub fn new(demos: &[Demo], what: &str) -> Result<Self> {
         let Some(first) = demos.first() else {
             return Err(Error::Failed(format!("there is no {what} demo: record more episodes, or look at why all failed")));
@@ -46,7 +46,8 @@ impl Corpus {
             return Err(Error::Failed(format!("{what} demos of {task} and {} are mixed; give one task's", other.task())));
         }
         let mut corpus = Corpus { task, starts: vec![0], states: vec![], next: vec![], commanded: vec![], executed: vec![] };
-        for demo in demos {
+        for (number, demo) in demos.iter().enumerate() {
+            plausible(demo).map_err(|why| Error::Failed(format!("{what} demo {number}: {why}")))?;
             for t in 0..demo.len() {
                 corpus.states.extend_from_slice(demo.state(t));
                 corpus.next.extend_from_slice(&demo.state(t + 1)[..BASE_DIM]);
@@ -118,6 +119,23 @@ impl Corpus {
     }
 }
 
+/// Names the first number that is beyond [`LARGEST_NUMBER`].
+fn plausible(demo: &Demo) -> std::result::Result<(), String> {
+    let dim = demo.task().state_dim();
+    let arrays =
+        [("state", demo.states(), dim), ("action", demo.actions(), JOINTS), ("executed action", demo.executed(), JOINTS)];
+    for (name, values, width) in arrays {
+        if let Some(at) = values.iter().position(|v| f64::from(v.abs()) > LARGEST_NUMBER) {
+            let (step, entry, value) = (at / width, at % width, values[at]);
+            return Err(format!(
+                "{name} of step {step}, entry {entry} is {value:e}; none can be larger than {LARGEST_NUMBER:e} (rad, rad/s, m): \
+                 record the episode again or leave it out"
+            ));
+        }
+    }
+    Ok(())
+}
+
 /// Row `r` of a row-major array.
 #[inline]
 pub fn row(array: &[f32], width: usize, r: usize) -> &[f32] {
@@ -144,5 +162,15 @@ mod tests {
         assert_eq!((corpus.rows(), corpus.demo(1)), (8, 5..8));
         assert_eq!(corpus.state(6), demos[1].state(1));
         assert_eq!(row(&corpus.next, BASE_DIM, 7), &demos[1].state(3)[..BASE_DIM]);
+    }
+
+    #[test]
+    fn a_number_beyond_all_measure_is_named_before_it_makes_a_loss_none() {
+        let like = demo(Task::PickUp, 5, 0);
+        let mut states = like.states().to_vec();
+        states[2 * Task::PickUp.state_dim() + 3] = 3e38;
+        let huge = Demo::new(Task::PickUp, states, like.actions().to_vec(), like.executed().to_vec()).expect("finite");
+        let said = Corpus::new(&[like, huge], "validation").err().expect("refused").to_string();
+        assert!(said.contains("validation demo 1: state of step 2, entry 3 is 3e38"), "{said}");
     }
 }

@@ -12,6 +12,7 @@ use crate::config::{
     ActionChoice, FeatureSet, FingerCloning, Objective, Pairs, PretrainSettings, PulseSettings, StateScale, Structure,
     TrainSettings,
 };
+use crate::math::exp_f32;
 use crate::nn::{Activation, LANES, Lanes, Pass};
 use crate::seed::stream;
 use crate::state::{ARM_JOINTS, BASE_DIM, FINGERS, JOINTS};
@@ -230,7 +231,7 @@ fn step_by_step(world: &World, gradient: &mut [f32]) -> f64 {
             let action: Vec<Lanes> = (0..JOINTS)
                 .map(|k| {
                     let eps = noise.get((at + t) * JOINTS + k).copied().unwrap_or(0.0);
-                    let mean = pi.output.get(t * LANES, k) + policy.log_std[k].exp() * eps;
+                    let mean = pi.output.get(t * LANES, k) + exp_f32(policy.log_std[k]) * eps;
                     let push = pushes.rows().get((at + t) * JOINTS + k).copied().unwrap_or(0.0);
                     Lanes::splat(policy.action_scaling().undo(k, mean) + push)
                 })

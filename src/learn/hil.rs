@@ -10,6 +10,7 @@ use super::{Dynamics, pretrain_dynamics::Batches};
 use crate::config::{Alpha, FingerCloning, TrainSettings};
 use crate::demo::Demo;
 use crate::error::{Error, Result};
+use crate::math;
 use crate::nn::cosine;
 use crate::seed::stream;
 use crate::table::Table;
@@ -196,7 +197,7 @@ impl Mixing {
 
     /// Takes in the lengths of the gradients of L_BC and L_SC at an epoch's first update.
     fn see_norms(&mut self, bc: f64, sc: f64) {
-        let now = (bc / sc).ln();
+        let now = math::ln(bc / sc);
         if now.is_finite() {
             let past = self.averages.log_ratio;
             self.averages.log_ratio = Some(past.map_or(now, |past| RATIO_KEEP * past + (1.0 - RATIO_KEEP) * now));
@@ -205,7 +206,7 @@ impl Mixing {
 
     /// Factor of L_SC.
     fn sc_scale(&self) -> f64 {
-        if self.balance { self.averages.log_ratio.map_or(1.0, f64::exp) } else { 1.0 }
+        if self.balance { self.averages.log_ratio.map_or(1.0, math::exp) } else { 1.0 }
     }
 
     fn weight(&mut self, d_conv: f64) -> f64 {
@@ -256,7 +257,7 @@ mod tests {
         assert!((mixing.sc_scale() - 0.01).abs() < 1e-12);
         mixing.see_norms(0.2, f64::NAN);
         mixing.see_norms(0.2, 2.0);
-        assert!((mixing.sc_scale().log10() + 1.8).abs() < 1e-12, "{}", mixing.sc_scale());
+        assert!((math::log10(mixing.sc_scale()) + 1.8).abs() < 1e-12, "{}", mixing.sc_scale());
     }
 
     #[test]

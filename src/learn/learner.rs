@@ -4,6 +4,7 @@ use super::behavior_cloning::{self as bc, Cloned, draw_noise, policy_gradient};
 use super::corpus::{Corpus, Samples};
 use super::dynamics::Dynamics;
 use super::fine_tuning::Model;
+use super::limits::{affordable, before_the_first_update};
 use super::metrics::{EpochMetrics, action_errors};
 use super::policy::Policy;
 use super::pushes::Pushes;
@@ -12,6 +13,7 @@ use super::state_cloning::{self as sc, Segment, draw_segments};
 use crate::config::{ActionChoice, TrainSettings};
 use crate::demo::Demo;
 use crate::error::{Error, Result};
+use crate::math::ln;
 use crate::nn::{Adam, Ema, clip_by_global_norm, gaussian, global_norm};
 use crate::seed::stream;
 use crate::state::JOINTS;
@@ -85,9 +87,15 @@ impl Learner {
                 other.state_dim()
             )));
         }
+        let most_rows = settings.bc_batch.max(settings.batch * corpus.longest()).min(corpus.rows());
+        affordable(
+            most_rows,
+            settings.hidden_layers,
+            settings.hidden_units,
+            "train.batch, train.bc_batch or train.hidden_units",
+        )?;
         let policy = Policy::new(&corpus, settings, &mut stream(seed, "train.init", 0));
         let model = dynamics.map(|dynamics| Model::new(dynamics, &corpus, &held_out));
-        let most_rows = settings.bc_batch.max(settings.batch * corpus.longest()).min(corpus.rows());
         Ok(Learner {
             seed,
             updates: 0,
@@ -194,6 +202,13 @@ impl Learner {
         if value.is_finite() {
             return Ok(());
         }
+        if self.draws == 1 {
+            return Err(Error::Failed(before_the_first_update(
+                term,
+                value,
+                "train.initial_std, train.tau and the networks' weights",
+            )));
+        }
         Err(Error::Failed(format!("{term} is {value} after {} updates of the stage: {remedy}", self.updates)))
     }
 
@@ -244,7 +259,7 @@ impl Learner {
         self.net_descent.adam.step(&mut self.policy.net.params_mut(), &self.gradient, learning_rate);
         self.net_descent.ema.update(self.policy.net.params());
         self.std_descent.adam.step(&mut self.policy.log_std, &d_log_std, learning_rate);
-        gaussian::floor_log_std(&mut self.policy.log_std, self.settings.std_floor.ln() as f32);
+        gaussian::floor_log_std(&mut self.policy.log_std, ln(self.settings.std_floor) as f32);
         self.std_descent.ema.update(&self.policy.log_std);
     }
 

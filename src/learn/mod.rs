@@ -13,6 +13,7 @@ mod gradient_tests;
 mod hand;
 pub mod hil;
 mod learner;
+mod limits;
 mod metrics;
 mod model_report;
 mod multi_step;

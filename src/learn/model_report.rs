@@ -2,6 +2,9 @@
 
 use super::corpus::{Corpus, row};
 use super::dynamics::{DT_S, Dynamics};
+use crate::error::Result;
+use crate::interrupt::Interrupt;
+use crate::math::acos;
 use crate::nn::{LANES, Panels, Pass};
 use crate::state::{ARM_JOINTS, BASE_DIM, JOINTS};
 use crate::table::{Table, Values};
@@ -37,7 +40,10 @@ enum Model {
 }
 
 /// See [`ModelReport::errors`].
-pub(super) fn error_table(dynamics: &Dynamics, corpus: &Corpus) -> Table {
+///
+/// # Errors
+/// [`crate::error::Error::Interrupted`].
+pub(super) fn error_table(dynamics: &Dynamics, corpus: &Corpus, interrupt: &Interrupt) -> Result<Table> {
     let names = |pick: fn(&(&str, &str, Range<usize>)) -> String| Values::Text(GROUPS.iter().map(pick).collect());
     let mut table = Table::default().with("group", "Entries of the state", names(|g| g.0.into())).with(
         "unit",
@@ -46,21 +52,28 @@ pub(super) fn error_table(dynamics: &Dynamics, corpus: &Corpus) -> Table {
     );
     for (name, model) in [("network", Model::Network), ("unchanged", Model::Unchanged), ("integrated", Model::Integrated)] {
         for steps in HORIZONS {
-            let errors = errors(dynamics, corpus, model, steps);
+            let errors = errors(dynamics, corpus, model, steps, interrupt)?;
             let plural = if steps == 1 { "step" } else { "steps" };
             let doc = format!("RMS error of the model \"{name}\" after {steps} control {plural}, open loop");
             table = table.with(&format!("{name}_{steps}_{plural}"), &doc, Values::F64(errors.to_vec()));
         }
     }
-    table
+    Ok(table)
 }
 
 /// RMS error of each group when every state that has a state `steps` later is rolled forward with the executed actions.
-fn errors(dynamics: &Dynamics, corpus: &Corpus, model: Model, steps: usize) -> [f64; GROUPS.len()] {
+fn errors(
+    dynamics: &Dynamics,
+    corpus: &Corpus,
+    model: Model,
+    steps: usize,
+    interrupt: &Interrupt,
+) -> Result<[f64; GROUPS.len()]> {
     let dim = corpus.task.state_dim();
     let (mut sums, mut count) = ([0.0f64; GROUPS.len()], 0usize);
     let mut pass = Pass::default();
     for demo in (0..corpus.demos()).map(|i| corpus.demo(i)).filter(|d| d.len() >= steps) {
+        interrupt.check()?;
         let rows = demo.len() + 1 - steps;
         let mut states = corpus.states[demo.start * dim..(demo.start + rows) * dim].to_vec();
         for k in 0..steps {
@@ -72,7 +85,7 @@ fn errors(dynamics: &Dynamics, corpus: &Corpus, model: Model, steps: usize) -> [
         }
         count += rows;
     }
-    sums.map(|sum| (sum / count as f64).sqrt())
+    Ok(sums.map(|sum| (sum / count as f64).sqrt()))
 }
 
 /// One step of all `states`; row r is given the executed action of transition `first + r`.
@@ -115,7 +128,7 @@ fn square_error(state: &[f32], truth: &[f32], (name, _, entries): &(&str, &str, 
         "block_rotation" => {
             let dot = |f: fn((f64, f64)) -> f64| pairs().map(f).sum::<f64>();
             let cos = dot(|(a, b)| a * b).abs() / (dot(|(a, _)| a * a) * dot(|(_, b)| b * b)).sqrt();
-            (2.0 * cos.min(1.0).acos()).powi(2)
+            (2.0 * acos(cos.min(1.0))).powi(2)
         }
         _ => sum / entries.len() as f64,
     }

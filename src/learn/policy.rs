@@ -5,12 +5,13 @@ use super::features::Features;
 use super::scaling::Scaling;
 use super::weights::{Reader, push_features, push_network, push_scaling, vector};
 use crate::config::TrainSettings;
+use crate::math::{exp_f32, ln};
 use crate::nn::{Lanes, Mlp, Pass};
+use crate::seed::normal;
 use crate::state::JOINTS;
 use crate::tasks::Task;
 use crate::tensor::NamedTensor;
 use rand::Rng;
-use rand_distr::{Distribution, StandardNormal};
 use serde_json::{Value, json};
 
 /// Spread of the demo actions below which they count as constant \[rad/s\].
@@ -46,7 +47,7 @@ impl Policy {
             features,
             action: Scaling::fit(&corpus.commanded, JOINTS, ACTION_FLOOR_RAD_S),
             net: Mlp::new(&widths, settings.activation, rng),
-            log_std: vec![settings.initial_std.max(settings.std_floor).ln() as f32; JOINTS],
+            log_std: vec![ln(settings.initial_std.max(settings.std_floor)) as f32; JOINTS],
             settings: settings.clone(),
         }
     }
@@ -89,8 +90,8 @@ impl Policy {
     /// When the row is not the task's.
     pub fn sample(&self, state_row: &[f32], rng: &mut impl Rng) -> [f32; JOINTS] {
         let mean = self.mean(state_row);
-        let noise: [f32; JOINTS] = std::array::from_fn(|_| StandardNormal.sample(rng));
-        std::array::from_fn(|i| self.action.undo(i, mean[i] + self.log_std[i].exp() * noise[i]))
+        let noise: [f32; JOINTS] = std::array::from_fn(|_| normal(rng) as f32);
+        std::array::from_fn(|i| self.action.undo(i, mean[i] + exp_f32(self.log_std[i]) * noise[i]))
     }
 
     fn mean(&self, state_row: &[f32]) -> [f32; JOINTS] {

@@ -2,6 +2,7 @@
 
 use super::corpus::{Corpus, Samples};
 use super::dynamics::Dynamics;
+use super::limits::{affordable, before_the_first_update};
 use super::metrics::{EpochMetrics, Mean, table};
 use super::model_report::{ModelReport, error_table};
 use super::multi_step::{MultiStep, horizons};
@@ -30,6 +31,11 @@ pub fn pretrain_dynamics(
 ) -> Result<(Dynamics, ModelReport)> {
     settings.validate()?;
     let (corpus, held_out) = (Corpus::new(train, "training")?, Corpus::new(validation, "validation")?);
+    if settings.steps > 1 {
+        let rows = if settings.batch_rows == 0 { corpus.longest() } else { settings.batch_rows.min(corpus.rows()) };
+        let keys = "pretrain.batch_rows, pretrain.steps or pretrain.hidden_units";
+        affordable(rows * settings.steps, settings.hidden_layers, settings.hidden_units, keys)?;
+    }
     let mut dynamics = Dynamics::new(&corpus, settings, &mut stream(seed, "pretrain.init", 0));
     let held_out_samples = held_out.model_samples(&dynamics);
     let mut lesson = Lesson::new(&corpus, &dynamics);
@@ -50,10 +56,7 @@ pub fn pretrain_dynamics(
                 interrupt.check()?;
                 let (l_model, gradient) = lesson.gradient(&dynamics, rows);
                 if !l_model.is_finite() {
-                    let update = updates + 1;
-                    return Err(Error::Failed(format!(
-                        "the loss of the dynamics network (Eq. 6) is {l_model} at update {update}; lower pretrain.learning_rate"
-                    )));
+                    return Err(no_number(l_model, updates));
                 }
                 clip_by_global_norm(gradient, settings.clip_norm);
                 metrics.learning_rate = cosine(settings.learning_rate, settings.final_learning_rate, updates, total);
@@ -65,14 +68,35 @@ pub fn pretrain_dynamics(
             averaged.net.params_mut().copy_from_slice(ema.average());
             (metrics.updates, metrics.l_model) = (updates, mean.get());
             metrics.validation_l_model = validation_loss(&averaged, &held_out, &held_out_samples, &mut work);
+            check_validation(&metrics)?;
             log(&metrics);
             epochs.push(metrics);
         }
         dynamics = averaged;
     }
     dynamics.turn(); // the first network is in use
-    let errors = error_table(&dynamics, &held_out);
+    let errors = error_table(&dynamics, &held_out, interrupt)?;
     Ok((dynamics, ModelReport { errors, metrics: table(&epochs) }))
+}
+
+const TERM: &str = "the loss of the dynamics network (Eq. 6)";
+const REMEDY: &str = "lower pretrain.learning_rate or set pretrain.clip_norm; nothing was written";
+
+/// The loss of an update after `updates` others is no number.
+fn no_number(value: f64, updates: u64) -> Error {
+    Error::Failed(match updates {
+        0 => before_the_first_update(TERM, value, "pretrain.loss and pretrain.features"),
+        _ => format!("{TERM} is {value} at update {}: {REMEDY}", updates + 1),
+    })
+}
+
+/// An epoch may end just after its last update has gone wrong, and averaged weights go wrong by themselves; the validation demos show it.
+fn check_validation(row: &EpochMetrics) -> Result<()> {
+    let (value, place, updates) = (row.validation_l_model, row.place(), row.updates);
+    if value.is_finite() {
+        return Ok(());
+    }
+    Err(Error::Failed(format!("{TERM} on the validation demos is {value} after {place} (update {updates}): {REMEDY}")))
 }
 
 /// What there is to learn from, and how: Eq. 6, or the same over several steps.

@@ -2,9 +2,9 @@
 
 use crate::config::{PulseSettings, TrainSettings};
 use crate::pulse::Pulse;
+use crate::seed::normal;
 use crate::state::JOINTS;
 use rand::Rng;
-use rand_distr::{Distribution, StandardNormal};
 
 /// Noise and pulses as in the simulator (`sim::Disturbance`), for all steps of an update at once.
 pub struct Pushes {
@@ -32,7 +32,7 @@ impl Pushes {
                 let unit = pulse.advance(&self.pulses, rng);
                 let (sigma, pulse_sigma) = (self.sigma_rad_s, self.pulses.sigma_rad_s as f32);
                 let push = |i: usize| unit.get(i).map_or(0.0, |unit| pulse_sigma * *unit as f32);
-                self.rows.extend((0..JOINTS).map(|i| sigma * normal(rng) + push(i)));
+                self.rows.extend((0..JOINTS).map(|i| sigma * normal(rng) as f32 + push(i)));
             }
         }
     }
@@ -41,10 +41,6 @@ impl Pushes {
     pub fn rows(&self) -> &[f32] {
         &self.rows
     }
-}
-
-fn normal(rng: &mut impl Rng) -> f32 {
-    StandardNormal.sample(rng)
 }
 
 #[cfg(test)]

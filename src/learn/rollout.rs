@@ -11,6 +11,7 @@ use super::policy::Policy;
 use super::regression::bend;
 use super::state_cloning::{Batch, Choices, Segment};
 use crate::config::{ActionChoice, Structure};
+use crate::math::exp_f32;
 use crate::nn::{LANES, Lanes, Panels, Pass, kernel, panels_of};
 use crate::state::{ARM_JOINTS, BASE_DIM, FINGERS, JOINTS};
 use std::ops::Range;
@@ -236,7 +237,7 @@ impl Rollout {
             }
             let (actions, noise, pushes) = (self.actions.panel_mut(p), self.noise.panel(p), self.pushes.panel(p));
             for (k, (action, eps)) in actions.iter_mut().zip(noise).enumerate() {
-                let shift = if sampled { *eps * policy.log_std[k].exp() } else { Lanes::default() };
+                let shift = if sampled { *eps * exp_f32(policy.log_std[k]) } else { Lanes::default() };
                 *action = (*action + shift).map(|mean| policy.action_scaling().undo(k, mean));
                 if pushed {
                     *action += pushes[k];
@@ -313,7 +314,7 @@ impl Rollout {
                     d_mean[k] = d_mean[k] * self.taught.panel(p)[k - ARM_JOINTS];
                 }
                 if choices.action == ActionChoice::Sample {
-                    self.d_log_std[k] += (d_mean[k] * self.noise.panel(p)[k]).sum() * policy.log_std[k].exp();
+                    self.d_log_std[k] += (d_mean[k] * self.noise.panel(p)[k]).sum() * exp_f32(policy.log_std[k]);
                 }
             }
         }

@@ -175,7 +175,7 @@ fn what_cannot_work_is_refused_in_words() {
     let diverging = TrainSettings { warm_start_learning_rate: 1e30, clip_norm: 0.0, ..quick() };
     let message = refused(Method::Bc, &diverging, None).to_string();
     assert!(message.contains("L_BC"), "{message}");
-    go.raise();
+    go.raise(2);
     let (some, held_out) = (demos(Task::Stack, 2, 9, 0), demos(Task::Stack, 1, 9, 9));
     let error = train(Method::Bc, &some, &held_out, None, &quick(), 0, Hooks::new(&go)).expect_err("interrupted");
     assert!(matches!(error, Error::Interrupted));
@@ -236,4 +236,56 @@ fn the_literal_preset_parses_and_trains() {
     assert_eq!(alpha("alpha = 0.3"), Ok(Alpha::Fixed(0.3)));
     assert_eq!(alpha("alpha = 1"), Ok(Alpha::Fixed(1.0)));
     assert!(alpha("alpha = \"auto\"").expect_err("refused").contains("adaptive"));
+}
+
+/// One update an epoch: the validation demos meet the diverged network before another update does.
+#[test]
+fn pretraining_whose_validation_loss_is_no_number_fails_and_says_since_when() {
+    let (train, held_out) = (demos(Task::Stack, 4, 20, 0), demos(Task::Stack, 2, 20, 100));
+    let fails = |settings: PretrainSettings| {
+        let result = pretrain_dynamics(&train, &held_out, &settings, 0, &mut |_| {}, &Interrupt::default());
+        result.expect_err("diverged").to_string()
+    };
+    let diverging =
+        PretrainSettings { hidden_units: 8, epochs: 5, batch_rows: 1_000_000, learning_rate: 1e38, ..Default::default() };
+    let message = fails(PretrainSettings { ema_decay: 0.0, ..diverging.clone() });
+    for part in
+        ["Eq. 6", "on the validation demos is", "after pretrain epoch 1 of 5", "pretrain.learning_rate", "nothing was written"]
+    {
+        assert!(message.contains(part), "{part}: {message}");
+    }
+    let message = fails(PretrainSettings { batch_rows: 16, ..diverging });
+    assert!(
+        message.contains("Eq. 6") && message.contains("at update 2") && message.contains("pretrain.learning_rate"),
+        "{message}"
+    );
+}
+
+/// No learning rate is to blame for what was so before anything was learned.
+#[test]
+fn a_loss_that_is_none_before_the_first_update_blames_the_demos_and_not_the_learning_rate() {
+    let settings = quick();
+    let (train, held_out) = (demos(Task::Stack, 2, 9, 0), demos(Task::Stack, 1, 9, 9));
+    let mut learner = Learner::new(&train, &held_out, None, &settings, 0).expect("a learner");
+    learner.policy.net.params_mut().fill(f32::NAN);
+    let message = learner.behavior_cloning(&[0, 1, 2], 1.0).expect_err("no number").to_string();
+    assert!(message.contains("L_BC (Eq. 3) is NaN before the first update: look at the demos"), "{message}");
+    assert!(!message.contains("learning_rate"), "{message}");
+    let message = learner.behavior_cloning(&[0, 1, 2], 1.0).expect_err("no number").to_string();
+    assert!(message.contains("train.learning_rate"), "{message}");
+}
+
+#[test]
+fn demos_that_never_change_are_learned_from_without_a_loss_that_is_none() {
+    let still = |seed| {
+        let like = demo(Task::PickUp, 12, seed);
+        let row = like.state(0).to_vec();
+        let states = row.repeat(13);
+        Demo::new(Task::PickUp, states, vec![0.0; 12 * JOINTS], vec![0.0; 12 * JOINTS]).expect("lengths match")
+    };
+    let (one, other) = ([still(1), still(1)], [still(1)]);
+    let settings = PretrainSettings { hidden_units: 8, epochs: 2, ..Default::default() };
+    let (dynamics, _) =
+        pretrain_dynamics(&one, &other, &settings, 0, &mut |_| {}, &Interrupt::default()).expect("constant columns are no fault");
+    train(Method::Hil, &one, &other, Some(dynamics), &quick(), 7, Hooks::new(&Interrupt::default())).expect("trains");
 }

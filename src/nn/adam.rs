@@ -1,5 +1,7 @@
 //! Adam (Kingma & Ba 2015) on a flat parameter vector, gradient clipping, the cosine schedule, an average of the weights.
 
+use crate::math::{cos, pow};
+
 /// Decay of the first moment.
 const BETA_1: f32 = 0.9;
 /// Decay of the second moment.
@@ -38,7 +40,7 @@ impl Adam {
     /// One step down the gradient.
     pub fn step(&mut self, params: &mut [f32], gradient: &[f32], learning_rate: f64) {
         self.steps += 1;
-        let correction = |beta: f32| 1.0 - f64::from(beta).powf(f64::from(self.steps));
+        let correction = |beta: f32| 1.0 - pow(f64::from(beta), f64::from(self.steps));
         let rate = (learning_rate / correction(BETA_1)) as f32;
         let scale = (1.0 / correction(BETA_2)) as f32;
         let moments = self.first.iter_mut().zip(&mut self.second);
@@ -75,7 +77,7 @@ pub fn clip_by_global_norm(gradient: &mut [f32], limit: f64) -> f64 {
 /// Learning rate at `step` of `steps`: from `first` to `last` along half a cosine.
 pub fn cosine(first: f64, last: f64, step: u64, steps: u64) -> f64 {
     let progress = step.min(steps) as f64 / steps.max(1) as f64;
-    last + 0.5 * (first - last) * (1.0 + (std::f64::consts::PI * progress).cos())
+    last + 0.5 * (first - last) * (1.0 + cos(std::f64::consts::PI * progress))
 }
 
 /// Exponential moving average of a parameter vector. It starts as a plain average, so that early weights are soon forgotten.

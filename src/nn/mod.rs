@@ -2,7 +2,7 @@
 //!
 //! Samples lie in panels of eight rows ([`lanes`]), parameters in flat row-major arrays, all f32. Nothing here allocates once its
 //! workspace ([`Pass`]) has grown to the batch. Matrix products with what ends them ([`kernel`]) pick their instructions by the processor's
-//! features; everything else uses no fused multiply-add and gives the same bytes on every processor.
+//! features; their results, like all others, have the same bits on every processor.
 
 pub mod activation;
 pub mod adam;

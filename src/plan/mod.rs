@@ -18,7 +18,7 @@ pub use grasp::{GRASP_OVER_CENTER_M, LIFTED_CENTER_M, RELEASE_GAP_M};
 pub use planner::Planner;
 pub use smooth::Limits;
 pub use table::{from_table, to_table};
-pub use world::{CLEARANCE_M, RESOLUTION_M};
+pub use world::{CLEARANCE_M, RESOLUTION_M, check_ready_pose};
 
 use crate::demo::Phase;
 use crate::scene::Scene;

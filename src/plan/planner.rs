@@ -8,6 +8,7 @@ use super::world::{Block, PATH_CLEARANCES_M, World};
 use super::{CLOSED_RAD, Plan, PlanError, Waypoint};
 use crate::config::PlanSettings;
 use crate::demo::Phase;
+use crate::interrupt::Interrupt;
 use crate::robot::jaco::PRESHAPE_RAD;
 use crate::robot::{Ik, READY_Q_RAD};
 use crate::scene::Scene;
@@ -24,6 +25,7 @@ pub struct Planner {
     pub(super) settings: PlanSettings,
     pub(super) limits: Limits,
     pub(super) ik: Ik,
+    pub(super) interrupt: Interrupt,
     /// See [`closing`].
     closing: Vec<f64>,
 }
@@ -32,7 +34,14 @@ impl Planner {
     /// A planner with these settings.
     pub fn new(settings: &PlanSettings) -> Self {
         let limits = Limits::new(settings);
-        Planner { settings: settings.clone(), limits, ik: Ik::new(), closing: closing(&limits) }
+        let interrupt = Interrupt::default();
+        let closing = closing(&limits, &interrupt);
+        Planner { settings: settings.clone(), limits, ik: Ik::new(), interrupt, closing }
+    }
+
+    /// Lets Ctrl-C end the planning of a scene: a plan that was on its way is an error then.
+    pub fn with_interrupt(self, interrupt: &Interrupt) -> Self {
+        Planner { interrupt: interrupt.clone(), ..self }
     }
 
     /// Plans one demonstration of `scene`; `index` goes into the plan, `rng` is used only where a search is needed.
@@ -48,6 +57,9 @@ impl Planner {
                     Ok(pieces) => return Ok(Plan { index, scene: scene.clone(), waypoints: waypoints(&pieces) }),
                     Err(error) if farthest.as_ref().is_none_or(|f| error.progress() >= f.progress()) => farthest = Some(error),
                     Err(_) => {}
+                }
+                if self.interrupt.is_raised() {
+                    return Err(PlanError::Transit("interrupted".into()));
                 }
             }
             if !world.has_obstacles() {
@@ -147,14 +159,14 @@ impl Planner {
 }
 
 /// Angles of a finger that closes from the open hand, at the control rate \[rad\]; backwards, it opens.
-fn closing(limits: &Limits) -> Vec<f64> {
+fn closing(limits: &Limits, interrupt: &Interrupt) -> Vec<f64> {
     let path: Vec<[f64; JOINTS]> = (0..=FINGER_SAMPLES)
         .map(|k| {
             let angle = PRESHAPE_RAD + (CLOSED_RAD - PRESHAPE_RAD) * k as f64 / FINGER_SAMPLES as f64;
             std::array::from_fn(|j| if j < ARM_JOINTS { READY_Q_RAD[j] } else { angle })
         })
         .collect();
-    let samples = smooth_path(&path, limits).expect("the fingers' limits are constants that leave room");
+    let samples = smooth_path(&path, limits, interrupt).expect("the fingers' limits are constants that leave room");
     samples.iter().map(|q| q[ARM_JOINTS]).collect()
 }
 

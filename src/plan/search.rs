@@ -3,6 +3,7 @@
 
 use super::path::{Knot, tool_pose};
 use super::world::{Block, World};
+use crate::interrupt::Interrupt;
 use crate::robot::Ik;
 use crate::state::JOINTS;
 use rand::{Rng, RngExt};
@@ -31,10 +32,11 @@ pub(super) struct Search<'a> {
     pub(super) margin_m: f64,
     pub(super) iterations: usize,
     pub(super) shortcuts: usize,
+    pub(super) interrupt: &'a Interrupt,
 }
 
 impl Search<'_> {
-    /// Knots of a free path between two ends, each with its joint angles; `None` when the iterations are spent.
+    /// Knots of a free path between two ends, each with its joint angles; `None` when the iterations are spent, or on an interrupt.
     pub(super) fn connect(
         &mut self,
         from: (Knot, [f64; JOINTS]),
@@ -44,6 +46,7 @@ impl Search<'_> {
         let mut trees = [from, to].map(|(knot, q)| vec![Node { knot, q, parent: 0 }]);
         let low_z = from.0.z.min(to.0.z);
         for round in 0..self.iterations {
+            self.interrupt.check().ok()?;
             let (grown, other) = (round % 2, 1 - round % 2);
             let mut within = |[low, high]: [f64; 2]| low + (high - low) * rng.random::<f64>();
             let goal =
@@ -79,7 +82,7 @@ impl Search<'_> {
     /// Takes straight shortcuts between random knots, then keeps the corners only.
     fn shorten(&mut self, mut path: Vec<Node>, rng: &mut impl Rng) -> Vec<Knot> {
         for _ in 0..self.shortcuts {
-            if path.len() < 3 {
+            if path.len() < 3 || self.interrupt.is_raised() {
                 break;
             }
             let (a, b) = (rng.random_range(0..path.len()), rng.random_range(0..path.len()));

@@ -5,6 +5,7 @@
 //! and beyond them (at rest before and after).
 
 use crate::config::PlanSettings;
+use crate::interrupt::Interrupt;
 use crate::robot::{POSITION_LIMITS_RAD, VELOCITY_LIMITS_RAD_S};
 use crate::state::{ARM_JOINTS, CONTROL_DT_S, JOINTS};
 use clarabel::algebra::CscMatrix;
@@ -55,8 +56,8 @@ impl Limits {
     }
 }
 
-/// Smooths samples that are one control step apart; `None` when no trajectory of this duration holds the limits.
-pub(super) fn smooth(samples: &[Q], limits: &Limits) -> Option<Vec<Q>> {
+/// Smooths samples that are one control step apart; `None` when no trajectory of this duration holds the limits, or on an interrupt.
+pub(super) fn smooth(samples: &[Q], limits: &Limits, interrupt: &Interrupt) -> Option<Vec<Q>> {
     let mut smoothed = samples.to_vec();
     let last = samples.len() - 1;
     if last < 2 {
@@ -68,6 +69,7 @@ pub(super) fn smooth(samples: &[Q], limits: &Limits) -> Option<Vec<Q>> {
     });
     let mut program = None;
     for j in 0..JOINTS {
+        interrupt.check().ok()?;
         let path: Vec<f64> = samples.iter().map(|q| q[j]).collect();
         if path.iter().all(|q| (q - path[0]).abs() < STILL_RAD) {
             continue;
@@ -212,7 +214,7 @@ mod tests {
     fn rounds_a_kink_off_within_the_limits_and_keeps_the_ends() {
         // Velocity jumps from 0 to 0.4 rad/s and back: far beyond the acceleration limit.
         let samples: Vec<Q> = (0..60).map(|k: i32| [0.85 + 0.02 * f64::from((k - 15).clamp(0, 30)); JOINTS]).collect();
-        let smoothed = smooth(&samples, &limits()).expect("there is time enough");
+        let smoothed = smooth(&samples, &limits(), &Interrupt::default()).expect("there is time enough");
         assert_eq!((smoothed[0], smoothed[59]), (samples[0], samples[59]));
         for w in smoothed.windows(3) {
             assert!((w[1][0] - w[0][0]).abs() / CONTROL_DT_S <= 0.5);
@@ -226,6 +228,6 @@ mod tests {
     #[test]
     fn says_when_the_time_is_too_short() {
         let samples: Vec<Q> = (0..10).map(|k| [3.0 + 0.1 * f64::from(k); JOINTS]).collect();
-        assert!(smooth(&samples, &limits()).is_none());
+        assert!(smooth(&samples, &limits(), &Interrupt::default()).is_none());
     }
 }

@@ -1,6 +1,7 @@
 //! Time along a path: the fastest speed profile that the joints' velocity and acceleration limits allow, from rest to rest.
 
 use super::smooth::Limits;
+use crate::config::MOST_STEPS;
 use crate::state::{CONTROL_DT_S, JOINTS};
 
 /// Points between two samples of the path, by cubic interpolation.
@@ -14,8 +15,9 @@ const STILL_RAD: f64 = 1e-9;
 
 type Q = [f64; JOINTS];
 
-/// Samples the path at the control rate, `stretch` times slower than the fastest profile; first and last sample are its ends.
-pub(super) fn time(path: &[Q], limits: &Limits, stretch: f64) -> Vec<Q> {
+/// Samples the path at the control rate, `stretch` times slower than the fastest profile; first and last sample are its ends. The number
+/// of control steps as an error when more than [`MOST_STEPS`], which nothing could execute.
+pub(super) fn time(path: &[Q], limits: &Limits, stretch: f64) -> Result<Vec<Q>, f64> {
     let points = refine(path);
     let speed = profile(&points, limits);
     let mut clock = vec![0.0; points.len()];
@@ -23,7 +25,12 @@ pub(super) fn time(path: &[Q], limits: &Limits, stretch: f64) -> Vec<Q> {
         clock[i] = clock[i - 1] + 2.0 / (speed[i - 1] + speed[i]);
     }
     let total = clock[points.len() - 1];
-    let steps = (total * stretch / CONTROL_DT_S).ceil().max(1.0) as usize;
+    let steps = (total * stretch / CONTROL_DT_S).ceil().max(1.0);
+    // Also when the limits are so small that the time is no number.
+    if !total.is_finite() || steps > f64::from(MOST_STEPS) {
+        return Err(steps);
+    }
+    let steps = steps as usize;
     let (mut samples, mut cell) = (Vec::with_capacity(steps + 1), 0);
     for k in 0..=steps {
         let t = total * k as f64 / steps as f64;
@@ -37,7 +44,7 @@ pub(super) fn time(path: &[Q], limits: &Limits, stretch: f64) -> Vec<Q> {
         samples.push(std::array::from_fn(|j| points[cell][j] + share * (points[cell + 1][j] - points[cell][j])));
     }
     samples[steps] = path[path.len() - 1];
-    samples
+    Ok(samples)
 }
 
 /// Catmull-Rom interpolation.
@@ -101,12 +108,23 @@ mod tests {
     fn a_straight_line_takes_the_time_of_a_trapezoid() {
         let limits = Limits { velocity_rad_s: [0.5; JOINTS], acceleration_rad_s2: [2.0; JOINTS] };
         let path: Vec<Q> = (0..=20).map(|k| [k as f64 * 0.05; JOINTS]).collect();
-        let samples = time(&path, &limits, 1.0);
+        let samples = time(&path, &limits, 1.0).expect("short enough");
         let (v, a) = (0.5 * RESERVE, 2.0 * RESERVE);
         let expected = 1.0 / v + v / a;
         let taken = (samples.len() - 1) as f64 * CONTROL_DT_S;
         assert!((taken - expected).abs() < 0.08, "{taken} s against {expected} s");
         assert!(samples.windows(2).all(|w| w[1][0] >= w[0][0] && w[1][0] - w[0][0] < 0.5 * CONTROL_DT_S));
         assert_eq!((samples[0], samples[samples.len() - 1]), (path[0], path[20]));
+    }
+
+    /// Each would otherwise take all memory there is.
+    #[test]
+    fn a_path_that_takes_longer_than_can_be_executed_is_given_up_before_it_is_sampled() {
+        let path: Vec<Q> = (0..=20).map(|k| [k as f64 * 0.05; JOINTS]).collect();
+        for (velocity, acceleration) in [(1e-5, 3.0), (0.5, 1e-12), (0.5, 1e-300), (1e-300, 1e-300), (f64::MIN_POSITIVE, 3.0)] {
+            let limits = Limits { velocity_rad_s: [velocity; JOINTS], acceleration_rad_s2: [acceleration; JOINTS] };
+            let steps = time(&path, &limits, 1.0).expect_err("too long");
+            assert!(steps > 10_000.0 || steps.is_nan(), "{velocity} rad/s and {acceleration} rad/s^2 took {steps} steps");
+        }
     }
 }

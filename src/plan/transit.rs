@@ -7,7 +7,9 @@ use super::smooth::{Limits, smooth};
 use super::timing::time;
 use super::world::{Block, CLEARANCE_M, World};
 use super::{PlanError, Planner};
+use crate::config::MOST_STEPS;
 use crate::demo::Phase;
+use crate::interrupt::Interrupt;
 use crate::state::JOINTS;
 use rand::Rng;
 
@@ -91,12 +93,15 @@ impl Planner {
 
     fn try_corner(&mut self, world: &World, leg: &Leg, knots: &[Knot], corner_m: f64) -> Result<Vec<[f64; JOINTS]>, PlanError> {
         let transit = |why: String| PlanError::Transit(format!("{}: {why}", leg.phase.name()));
+        if self.interrupt.is_raised() {
+            return Err(transit("interrupted".into()));
+        }
         let path = follow(&mut self.ik, knots, corner_m, &leg.start).map_err(|why| transit(why.to_string()))?;
         if world.has_obstacles() {
             clear(world, &path, &leg.block, leg.margin_m).map_err(transit)?;
         }
         let smoothing = |why: String| PlanError::Smoothing(format!("{}: {why}", leg.phase.name()));
-        let samples = smooth_path(&path, &self.limits).map_err(smoothing)?;
+        let samples = smooth_path(&path, &self.limits, &self.interrupt).map_err(smoothing)?;
         clear(world, &samples, &leg.block, CLEARANCE_M).map_err(smoothing)?;
         Ok(samples)
     }
@@ -111,7 +116,8 @@ impl Planner {
         }
         let iterations = self.settings.search_iterations;
         let shortcuts = self.settings.shortcut_iterations;
-        let mut search = Search { ik: &mut self.ik, world, block: &leg.block, margin_m, iterations, shortcuts };
+        let interrupt = &self.interrupt;
+        let mut search = Search { ik: &mut self.ik, world, block: &leg.block, margin_m, iterations, shortcuts, interrupt };
         search.connect((leg.from, from), (leg.to, to), rng).ok_or_else(|| {
             format!("no other way was found in {iterations} iterations; raise plan.search_iterations or move the obstacles")
         })
@@ -119,11 +125,27 @@ impl Planner {
 }
 
 /// Times and smooths a joint path; slower when that is what the limits ask for.
-pub(super) fn smooth_path(path: &[[f64; JOINTS]], limits: &Limits) -> Result<Vec<[f64; JOINTS]>, String> {
-    (0..SMOOTH_ATTEMPTS).find_map(|attempt| smooth(&time(path, limits, STRETCH.powi(attempt)), limits)).ok_or_else(|| {
-        let slowest = STRETCH.powi(SMOOTH_ATTEMPTS - 1);
-        format!("no trajectory within the limits, even {slowest:.1} times slower; raise plan.max_acceleration_rad_s2 or lower plan.speed")
-    })
+pub(super) fn smooth_path(path: &[[f64; JOINTS]], limits: &Limits, interrupt: &Interrupt) -> Result<Vec<[f64; JOINTS]>, String> {
+    for attempt in 0..SMOOTH_ATTEMPTS {
+        let timed = time(path, limits, STRETCH.powi(attempt)).map_err(too_long)?;
+        match smooth(&timed, limits, interrupt) {
+            Some(samples) => return Ok(samples),
+            None if interrupt.is_raised() => return Err("interrupted".into()),
+            None => {}
+        }
+    }
+    let slowest = STRETCH.powi(SMOOTH_ATTEMPTS - 1);
+    Err(format!(
+        "no trajectory within the limits, even {slowest:.1} times slower; raise plan.max_acceleration_rad_s2 or lower plan.speed"
+    ))
+}
+
+fn too_long(steps: f64) -> String {
+    let steps = if steps < 1e9 { format!("{steps:.0}") } else { format!("{steps:.0e}") };
+    format!(
+        "it would take {steps} control steps, and simulate.max_steps can allow no more than {MOST_STEPS}; raise plan.speed or \
+         plan.max_acceleration_rad_s2"
+    )
 }
 
 /// Checks a joint path at the resolution of the collision check.

@@ -1,10 +1,12 @@
 //! What a plan must keep clear of: table, obstacles, base block, the block itself, and the arm's own base.
 
 use super::collision::{Solid, place_links};
+use crate::config::SceneSettings;
+use crate::error::{Error, Result};
 use crate::robot::jaco::{HAND_LINK, LINK_NAMES, LINK_SHAPES};
 use crate::robot::kinematics::tool_of;
-use crate::robot::{Arm, LinkPoses};
-use crate::scene::{BLOCK_EDGE_M, Scene};
+use crate::robot::{Arm, LinkPoses, READY_Q_RAD};
+use crate::scene::{BLOCK_EDGE_M, Obstacle, Scene};
 use crate::state::{Context, JOINTS};
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 
@@ -27,6 +29,9 @@ const SUPPORT_ZONE_Z_M: f64 = 0.05;
 /// The greatest distance between two configurations that are checked \[m\].
 pub const RESOLUTION_M: f64 = 0.01;
 
+/// Whether nothing comes too near; what does, in words.
+type Free = std::result::Result<(), String>;
+
 /// Where the block is while a piece of the plan is executed.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Block {
@@ -34,6 +39,27 @@ pub(super) enum Block {
     Free(Isometry3<f64>),
     /// The hand holds it, in this pose relative to the tool.
     Held(Isometry3<f64>),
+}
+
+/// Whether the boxes of the settings leave the arm's ready pose free, from which every episode begins.
+///
+/// # Errors
+/// [`Error::Usage`] names the box, and the link that it touches.
+pub fn check_ready_pose(settings: &SceneSettings) -> Result<()> {
+    let links = place_links(&Arm::new().link_poses(&READY_Q_RAD));
+    for (i, Obstacle { center_m, size_m }) in settings.obstacles.iter().enumerate() {
+        let at = Isometry3::from_parts(Translation3::from(*center_m), UnitQuaternion::identity());
+        let solid = Solid::cuboid(at, size_m.map(|s| s / 2.0));
+        let touched = links.iter().zip(&LINK_SHAPES).find(|(link, _)| !link.farther_than(&solid, CLEARANCE_M));
+        if let Some((_, shape)) = touched {
+            let (link, room) = (LINK_NAMES[shape.link], CLEARANCE_M * 1e3);
+            return Err(Error::Usage(format!(
+                "scene.obstacles[{i}], center_m {center_m:?} and size_m {size_m:?}, comes within {room:.0} mm of the arm where every \
+                 episode begins ({link}): move the box or make it smaller"
+            )));
+        }
+    }
+    Ok(())
 }
 
 /// The fixed things of a scene.
@@ -73,18 +99,12 @@ impl World {
     ///
     /// # Errors
     /// Names what comes too near to what.
-    pub(super) fn check(&self, q: &[f64; JOINTS], block: &Block, margin_m: f64) -> Result<(), String> {
+    pub(super) fn check(&self, q: &[f64; JOINTS], block: &Block, margin_m: f64) -> Free {
         self.check_poses(&self.arm.link_poses(q), block, margin_m)
     }
 
     /// The same along the straight joint path between two configurations, at [`RESOLUTION_M`]; the first one is not checked.
-    pub(super) fn check_motion(
-        &self,
-        from: &[f64; JOINTS],
-        to: &[f64; JOINTS],
-        block: &Block,
-        margin_m: f64,
-    ) -> Result<(), String> {
+    pub(super) fn check_motion(&self, from: &[f64; JOINTS], to: &[f64; JOINTS], block: &Block, margin_m: f64) -> Free {
         let end = self.arm.link_poses(to);
         let steps = (travel_m(&self.arm.link_poses(from), &end) / RESOLUTION_M).ceil().max(1.0) as usize;
         for k in 1..steps {
@@ -95,7 +115,7 @@ impl World {
         self.check_poses(&end, block, margin_m)
     }
 
-    fn check_poses(&self, poses: &LinkPoses, block: &Block, margin_m: f64) -> Result<(), String> {
+    fn check_poses(&self, poses: &LinkPoses, block: &Block, margin_m: f64) -> Free {
         let links = place_links(poses);
         let tool = tool_of(poses);
         let at_release = self.at_release(&tool);
@@ -125,7 +145,7 @@ impl World {
         check_self(&links)
     }
 
-    fn check_fixed(&self, solid: &Solid, name: &str, margin_m: f64, base_margin_m: f64) -> Result<(), String> {
+    fn check_fixed(&self, solid: &Solid, name: &str, margin_m: f64, base_margin_m: f64) -> Free {
         if let Some(i) = self.obstacles.iter().position(|o| !solid.farther_than(o, margin_m)) {
             return Err(format!("{name} comes within {:.0} mm of obstacle {i}", margin_m * 1e3));
         }
@@ -142,7 +162,7 @@ impl World {
 }
 
 /// Coarse: wrist, hand and fingers against base, shoulder and upper arm.
-fn check_self(links: &[Solid]) -> Result<(), String> {
+fn check_self(links: &[Solid]) -> Free {
     let with =
         |range: std::ops::RangeInclusive<usize>| LINK_SHAPES.iter().zip(links).filter(move |(s, _)| range.contains(&s.link));
     for (outer, a) in with(4..=9) {

@@ -3,9 +3,9 @@
 use crate::config::SimulateSettings;
 use crate::pulse::Pulse;
 use crate::robot::VELOCITY_LIMITS_RAD_S;
+use crate::seed::normal;
 use crate::state::Action;
 use rand_chacha::ChaCha8Rng;
-use rand_distr::{Distribution, StandardNormal};
 
 /// Turns commanded into executed actions, along one episode.
 #[derive(Clone, Debug)]
@@ -28,12 +28,8 @@ impl Disturbance {
         let unit = self.pulse.advance(&self.settings.pulses, &mut self.rng);
         std::array::from_fn(|i| {
             let pulse = unit.get(i).map_or(0.0, |unit| self.settings.pulses.sigma_rad_s * unit);
-            clamp(commanded[i] + sigma * self.normal() + pulse, i)
+            clamp(commanded[i] + sigma * normal(&mut self.rng) + pulse, i)
         })
-    }
-
-    fn normal(&mut self) -> f64 {
-        StandardNormal.sample(&mut self.rng)
     }
 }
 

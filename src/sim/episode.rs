@@ -2,10 +2,14 @@
 
 use super::disturbance::Disturbance;
 use super::world::World;
-use crate::demo::{Episode, Phase, Step};
+use crate::demo::{Contacts, Episode, LARGEST_NUMBER, Phase, Step};
+use crate::error::Result;
+use crate::guard::guarded;
+use crate::interrupt::Interrupt;
+use crate::robot::{Arm, READY_Q_RAD};
 use crate::scene::Scene;
-use crate::state::{Action, JOINTS};
-use crate::tasks::{Monitor, Observation, Verdict};
+use crate::state::{Action, Context, JOINTS, State};
+use crate::tasks::{FailureClass, Monitor, Observation, Verdict};
 
 /// Decides the command of each control step: the plan follower, or a learned policy.
 pub trait Controller {
@@ -18,39 +22,104 @@ pub trait Controller {
     }
 }
 
-/// Runs one episode until success (its last 0.5 s is the proof), `max_steps`, a block below the table, or a number that is not finite.
-/// A moment or a command that is not finite is left out of the record.
+/// Runs one episode until success (its last 0.5 s is the proof), `max_steps`, a block below the table, a command that is no number, or a
+/// simulation that breaks down: its numbers are none or beyond all measure, or the engine panics. Such a moment or command is left out of the record.
+///
+/// # Errors
+/// [`crate::error::Error::Interrupted`], within a step.
 pub fn run_episode(
     index: u64,
     scene: &Scene,
     controller: &mut dyn Controller,
     disturbance: &mut Disturbance,
     max_steps: u32,
-) -> Episode {
-    let mut world = World::new(scene);
-    let mut monitor = Monitor::new(scene);
-    let mut steps: Vec<Step> = Vec::new();
-    let mut seen = world.observe();
-    let mut verdict = monitor.update(&seen);
-    while !verdict.success && steps.len() < max_steps as usize && !fallen(&seen) {
-        let commanded = controller.command(&seen).map(|v| f64::from(v as f32));
-        if commanded.iter().any(|v| !v.is_finite()) {
-            break;
-        }
-        let executed = disturbance.apply(&commanded);
-        world.step(&executed);
-        let next = world.observe();
-        if !finite(&next) {
-            break;
-        }
-        steps.push(record(&seen, &verdict, commanded, executed, controller.phase()));
-        verdict = monitor.update(&next);
-        seen = next;
+    interrupt: &Interrupt,
+) -> Result<Episode> {
+    let mut run = Run::new(scene);
+    let end = guarded(|| run.until_the_end(controller, disturbance, max_steps, interrupt)).unwrap_or(Ok(End::BrokenDown))?;
+    let success = end == End::Regular && run.verdict.success;
+    let failure = match end {
+        End::Regular => (!success).then(|| run.monitor.classify(&run.seen)),
+        End::NoCommand => Some(FailureClass::CommandNotFinite),
+        End::BrokenDown => Some(FailureClass::SimulationBrokeDown),
+    };
+    let last = record(&run.seen, &run.verdict, [0.0; JOINTS], [0.0; JOINTS], None);
+    Ok(Episode { index, scene: scene.clone(), steps: run.steps, last, success, failure })
+}
+
+/// How an episode ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum End {
+    /// By success, by its last step, or by a fall.
+    Regular,
+    /// By a command that is no finite number.
+    NoCommand,
+    /// By a state that is none, or a panic of the engine.
+    BrokenDown,
+}
+
+/// What is known of an episode at any moment, also after a panic: the steps so far, and what was seen last.
+struct Run<'a> {
+    scene: &'a Scene,
+    monitor: Monitor,
+    steps: Vec<Step>,
+    seen: Observation,
+    verdict: Verdict,
+}
+
+impl<'a> Run<'a> {
+    fn new(scene: &'a Scene) -> Self {
+        let conditions = vec![false; scene.task.condition_names().len()];
+        let verdict = Verdict { conditions, reward: 0.0, success: false };
+        Run { scene, monitor: Monitor::new(scene), steps: Vec::new(), seen: at_rest(scene), verdict }
     }
-    let success = verdict.success;
-    let failure = (!success).then(|| monitor.classify(&seen));
-    let last = record(&seen, &verdict, [0.0; JOINTS], [0.0; JOINTS], None);
-    Episode { index, scene: scene.clone(), steps, last, success, failure }
+
+    fn until_the_end(
+        &mut self,
+        controller: &mut dyn Controller,
+        disturbance: &mut Disturbance,
+        max_steps: u32,
+        interrupt: &Interrupt,
+    ) -> Result<End> {
+        let mut world = World::new(self.scene);
+        let first = world.observe();
+        if !sound(&first) {
+            return Ok(End::BrokenDown);
+        }
+        self.see(first);
+        while !self.verdict.success && self.steps.len() < max_steps as usize && !fallen(&self.seen) {
+            interrupt.check()?;
+            let commanded = controller.command(&self.seen).map(|v| f64::from(v as f32));
+            if commanded.iter().any(|v| !v.is_finite()) {
+                return Ok(End::NoCommand);
+            }
+            let executed = disturbance.apply(&commanded);
+            world.step(&executed);
+            let next = world.observe();
+            if !sound(&next) {
+                return Ok(End::BrokenDown);
+            }
+            self.steps.push(record(&self.seen, &self.verdict, commanded, executed, controller.phase()));
+            self.see(next);
+        }
+        Ok(End::Regular)
+    }
+
+    fn see(&mut self, next: Observation) {
+        self.verdict = self.monitor.update(&next);
+        self.seen = next;
+    }
+}
+
+/// What there is to see before the first contact is known: the arm in its ready pose, the blocks where the scene has them.
+fn at_rest(scene: &Scene) -> Observation {
+    Observation {
+        state: State { q_rad: READY_Q_RAD, dq_rad_s: [0.0; JOINTS], block: scene.block, context: scene.context },
+        tool_m: Arm::new().tool_pose(&READY_Q_RAD).translation.vector.into(),
+        base_now: if let Context::Base(base) = scene.context { Some(base) } else { None },
+        contacts: Contacts::default(),
+        block_speed_m_s: 0.0,
+    }
 }
 
 fn record(seen: &Observation, verdict: &Verdict, commanded: Action, executed: Action, phase: Option<Phase>) -> Step {
@@ -73,9 +142,11 @@ fn fallen(seen: &Observation) -> bool {
     seen.state.block.position_m[2].min(base_height) < 0.0
 }
 
-fn finite(seen: &Observation) -> bool {
+/// Whether every number is one, and none is beyond what can be.
+fn sound(seen: &Observation) -> bool {
     let state = &seen.state;
     let base = seen.base_now.map_or([0.0; 7], |b| b.to_array());
-    let all = state.q_rad.iter().chain(&state.dq_rad_s).chain(&seen.contacts.finger_block_n);
-    all.copied().chain(state.block.to_array()).chain(base).chain([seen.block_speed_m_s]).all(f64::is_finite)
+    let motion = state.q_rad.iter().chain(&state.dq_rad_s).copied();
+    let motion = motion.chain(state.block.to_array()).chain(base).chain([seen.block_speed_m_s]);
+    motion.into_iter().all(|v| v.abs() <= LARGEST_NUMBER) && seen.contacts.finger_block_n.iter().all(|f| f.is_finite())
 }

@@ -10,6 +10,7 @@ pub use monitor::{Monitor, Observation, Verdict};
 pub use spawn::{REACH_M, REST_HEIGHT_M, draw_scene};
 
 use crate::state::BASE_DIM;
+use crate::words::unknown;
 use serde::{Deserialize, Serialize};
 use std::fmt;
 use std::str::FromStr;
@@ -26,7 +27,8 @@ pub enum Task {
     Stack,
 }
 
-/// Why an episode failed; the first that applies, in this order.
+/// Why an episode failed. What ended it early comes before all: a command or a state that is no number; then the first that applies, in
+/// this order.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum FailureClass {
@@ -42,22 +44,48 @@ pub enum FailureClass {
     Misplaced,
     /// Still on its way when the steps ran out.
     TimedOut,
+    /// The controller asked for a velocity that is no finite number.
+    CommandNotFinite,
+    /// The contact physics ended in numbers that are none: an arm pressed into a box, a block too light for its precision.
+    SimulationBrokeDown,
 }
 
 impl FailureClass {
     /// All classes, in the order of tables.
-    pub const ALL: [FailureClass; 6] = [
+    pub const ALL: [FailureClass; 8] = [
         FailureClass::NeverReached,
         FailureClass::NeverGrasped,
         FailureClass::Toppled,
         FailureClass::Dropped,
         FailureClass::Misplaced,
         FailureClass::TimedOut,
+        FailureClass::CommandNotFinite,
+        FailureClass::SimulationBrokeDown,
     ];
 
     /// The name in files and tables.
     pub fn name(self) -> &'static str {
-        ["never_reached", "never_grasped", "toppled", "dropped", "misplaced", "timed_out"][self as usize]
+        self.names()[0]
+    }
+
+    /// What happened, in words.
+    pub fn words(self) -> &'static str {
+        self.names()[1]
+    }
+
+    fn names(self) -> [&'static str; 2] {
+        match self {
+            FailureClass::NeverReached => ["never_reached", "the hand never came within reach of the block"],
+            FailureClass::NeverGrasped => ["never_grasped", "the block was reached, but never held between the fingers"],
+            FailureClass::Toppled => {
+                ["toppled", "the block lies over or fell off the base block, or the base block was pushed away"]
+            }
+            FailureClass::Dropped => ["dropped", "the block was held once and lost in the air"],
+            FailureClass::Misplaced => ["misplaced", "the block was released, but not where the task wants it"],
+            FailureClass::TimedOut => ["timed_out", "the steps ran out on the way"],
+            FailureClass::CommandNotFinite => ["command_not_finite", "a command was no finite number"],
+            FailureClass::SimulationBrokeDown => ["simulation_broke_down", "the simulation ended in numbers that are none"],
+        }
     }
 }
 
@@ -104,9 +132,6 @@ impl FromStr for Task {
     type Err = String;
 
     fn from_str(s: &str) -> Result<Self, String> {
-        Task::ALL
-            .into_iter()
-            .find(|t| t.name() == s)
-            .ok_or_else(|| format!("unknown task \"{s}\"; allowed: {}", Task::ALL.map(Task::name).join(", ")))
+        Task::ALL.into_iter().find(|t| t.name() == s).ok_or_else(|| unknown("task", s, &Task::ALL.map(Task::name)))
     }
 }

@@ -2,6 +2,7 @@
 
 use super::{FailureClass, Task, pick_and_place, pick_up, stack};
 use crate::demo::Contacts;
+use crate::math::cos;
 use crate::scene::{BLOCK_EDGE_M, Scene};
 use crate::state::{CONTROL_HZ, Pose, State};
 use nalgebra::Vector3;
@@ -146,7 +147,7 @@ impl Monitor {
     /// The class of a failed episode, from its history and its last moment.
     pub fn classify(&self, last: &Observation) -> FailureClass {
         let up = last.state.block.isometry() * self.start_up_axis();
-        let leaning = up.z < TOPPLE_RAD.cos();
+        let leaning = up.z < cos(TOPPLE_RAD);
         let base_pushed = match (last.base_now, self.scene.context) {
             (Some(now), crate::state::Context::Base(then)) => {
                 (Vector3::from(now.position_m) - Vector3::from(then.position_m)).norm() > BASE_PUSHED_M

@@ -4,6 +4,7 @@ use super::Task;
 use super::pick_and_place::MIN_TRAVEL_M;
 use crate::config::{SceneSettings, Spread};
 use crate::error::{Error, Result};
+use crate::math::hypot;
 use crate::scene::{BLOCK_EDGE_M, Obstacle, Scene};
 use crate::state::{Context, Pose};
 use rand::{Rng, RngExt};
@@ -33,7 +34,7 @@ pub fn draw_scene(task: Task, settings: &SceneSettings, rng: &mut impl Rng) -> R
                 Context::Base(Pose::from_yaw([x, y, REST_HEIGHT_M], 0.0))
             }
         };
-        let apart = |a: [f64; 3], b: [f64; 3], least: f64| f64::hypot(a[0] - b[0], a[1] - b[1]) >= least;
+        let apart = |a: [f64; 3], b: [f64; 3], least: f64| hypot(a[0] - b[0], a[1] - b[1]) >= least;
         let fits = match context {
             Context::None => true,
             Context::Goal(goal) => apart(goal, block.position_m, MIN_TRAVEL_M) && free(goal, &settings.obstacles),
@@ -99,7 +100,7 @@ fn draw_yaw(settings: &SceneSettings, rng: &mut impl Rng) -> f64 {
 /// Within reach, and clear of all boxes.
 fn free(point: [f64; 3], obstacles: &[Obstacle]) -> bool {
     let margin = BLOCK_EDGE_M / 2.0 + CLEARANCE_M;
-    let within_reach = (REACH_M[0]..=REACH_M[1]).contains(&f64::hypot(point[0], point[1]));
+    let within_reach = (REACH_M[0]..=REACH_M[1]).contains(&hypot(point[0], point[1]));
     within_reach && obstacles.iter().all(|o| (0..2).any(|i| (point[i] - o.center_m[i]).abs() > o.size_m[i] / 2.0 + margin))
 }
 
@@ -139,7 +140,7 @@ mod tests {
         let wide = SceneSettings { spawn_x_m: [0.1, 0.9], spawn_y_m: [-0.4, 0.4], ..SceneSettings::default() };
         for index in 0..200 {
             let [x, y, _] = draw(Task::PickUp, &wide, index).block.position_m;
-            assert!((REACH_M[0]..=REACH_M[1]).contains(&f64::hypot(x, y)), "a block at {x} {y}");
+            assert!((REACH_M[0]..=REACH_M[1]).contains(&hypot(x, y)), "a block at {x} {y}");
         }
     }
 

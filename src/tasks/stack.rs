@@ -2,6 +2,7 @@
 //! Success: resting on the base block alone, released by all fingers and at rest for 0.5 s.
 
 use super::monitor::{Observation, REST_SPEED_M_S};
+use crate::math::hypot;
 use crate::scene::BLOCK_EDGE_M;
 
 /// Horizontal offset of the two centres up to which a block rests on the other \[m\]: half an edge.
@@ -16,7 +17,7 @@ pub const CONDITIONS: [&str; 6] = ["reached", "grasped", "lifted", "on_base", "r
 pub(super) fn goal_conditions(seen: &Observation) -> [bool; 3] {
     let on_base = seen.base_now.is_some_and(|base| {
         let [dx, dy, dz] = std::array::from_fn(|i| seen.state.block.position_m[i] - base.position_m[i]);
-        f64::hypot(dx, dy) < ALIGNED_M && (dz - BLOCK_EDGE_M).abs() < LEVEL_M
+        hypot(dx, dy) < ALIGNED_M && (dz - BLOCK_EDGE_M).abs() < LEVEL_M
     });
     [on_base && seen.contacts.block_base && !seen.contacts.block_table, seen.released(), seen.block_speed_m_s < REST_SPEED_M_S]
 }

@@ -1,12 +1,12 @@
 //! LeRobot datasets: exact, deterministic, checked.
 
-use crate::fixtures::{episode, provenance};
+use crate::fixtures::{contents, episode, provenance};
 use crate::refuses_damage;
 use arrow_array::cast::AsArray;
 use arrow_array::types::Float32Type;
 use arrow_array::{Array, ArrayRef, FixedSizeListArray, Float32Array, RecordBatch};
 use hilt::data::dataset::{self, Dataset, DatasetEpisode};
-use hilt::data::{hash_path, inspect};
+use hilt::data::inspect;
 use hilt::demo::{Demo, Episode};
 use hilt::interrupt::Interrupt;
 use hilt::tasks::Task;
@@ -51,7 +51,7 @@ fn datasets_round_trip_exactly_with_the_last_state() {
         let (here, there) = (dir.path().join("train"), dir.path().join("elsewhere/train"));
         let demos = write(&here, task);
         write(&there, task);
-        assert_eq!(hash_path(&here).expect("hash"), hash_path(&there).expect("hash"));
+        assert_eq!(contents(&here), contents(&there));
         let Dataset { demos: found, rewards, successes, source_episodes, fps, provenance: origin, .. } =
             dataset::read_for(&here, task).expect("readable");
         assert_eq!(found, demos);
@@ -165,15 +165,15 @@ fn what_another_program_put_into_the_data_is_named() {
 #[test]
 fn nothing_is_written_without_episodes_or_over_foreign_files() {
     let (_dir, root) = written(Task::PickUp);
-    let before = hash_path(&root).expect("hash");
+    let before = contents(&root);
     let origin = provenance("convert", Task::PickUp);
     let message = dataset::write(&root, Task::PickUp, &[], &origin).unwrap_err().to_string();
     assert!(message.contains("at least one episode"), "{message}");
-    assert_eq!(hash_path(&root).expect("hash"), before);
+    assert_eq!(contents(&root), before);
     let (stack, home) = (episodes(Task::Stack), root.join("data"));
     let demos = demos(&stack);
     let rows: Vec<DatasetEpisode> = stack.iter().zip(&demos).map(|(e, d)| DatasetEpisode::of(e, d)).collect();
     assert!(dataset::write(&root, Task::PickUp, &rows, &origin).unwrap_err().to_string().contains("is of stack"));
     assert!(dataset::write(&home, Task::Stack, &rows, &origin).unwrap_err().to_string().contains("chunk-000"));
-    assert_eq!(hash_path(&root).expect("hash"), before);
+    assert_eq!(contents(&root), before);
 }

@@ -11,6 +11,21 @@ use hilt::tensor::NamedTensor;
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 use serde_json::json;
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+/// A file's bytes, or those of all files below a directory.
+pub fn contents(path: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
+    if path.is_file() {
+        return BTreeMap::from([(PathBuf::new(), fs::read(path).expect("readable"))]);
+    }
+    let inner = |entry: fs::DirEntry| {
+        let name = PathBuf::from(entry.file_name());
+        contents(&entry.path()).into_iter().map(move |(below, bytes)| (name.join(below), bytes))
+    };
+    fs::read_dir(path).expect("readable").flat_map(|entry| inner(entry.expect("entry"))).collect()
+}
 
 /// A provenance with nested settings.
 pub fn provenance(stage: &str, task: Task) -> Provenance {

@@ -37,7 +37,7 @@ fn write_a_run() {
             weights::write(&dir.join(format!("{kind}.safetensors")), kind, &tensors(), &json!({}), &origin("train"))
                 .expect("written");
         }
-        for name in ["plans.parquet", "training.parquet", "evaluation.parquet"] {
+        for name in ["plans.parquet", "policy.training.parquet", "evaluation.episodes.parquet"] {
             table_file::write(&dir.join(name), &table(100), &origin("plan")).expect("written");
         }
         json_file::write(&dir.join("evaluation.json"), &json!({ "task": task, "episodes": 0 }), &origin("evaluate"))

@@ -6,8 +6,8 @@ mod interop;
 mod limits;
 mod viewers;
 
-use fixtures::{episode, provenance, table, tensors};
-use hilt::data::{hash_path, inspect, inspect_text, json_file, recording, table_file, weights};
+use fixtures::{contents, episode, provenance, table, tensors};
+use hilt::data::{inspect, inspect_text, json_file, recording, table_file, weights};
 use hilt::error::{Error, Result};
 use hilt::interrupt::Interrupt;
 use hilt::table::Values;
@@ -63,7 +63,7 @@ fn recordings_round_trip_exactly_and_are_the_same_bytes_anywhere() {
         assert_eq!(found.steps[0].commanded[3].to_bits(), (-0.0f64).to_bits());
         assert_eq!(found_origin, origin);
     }
-    assert_eq!(hash_path(here.path()).expect("hash"), hash_path(there.path()).expect("hash"));
+    assert_eq!(contents(here.path()), contents(there.path()));
 }
 
 #[test]
@@ -129,11 +129,11 @@ fn weights_that_are_not_finite_are_refused_and_the_old_file_stays() {
     let path = dir.path().join("policy.safetensors");
     let (mut made, origin) = (tensors(), provenance("train", Task::PickUp));
     weights::write(&path, "policy", &made, &json!({}), &origin).expect("written");
-    let before = hash_path(&path).expect("hash");
+    let before = contents(&path);
     made[1].data[5] = f32::NAN;
     let message = weights::write(&path, "policy", &made, &json!({}), &origin).unwrap_err().to_string();
     assert!(message.contains("policy.layer_1.weight: number 5 is NaN"), "{message}");
-    assert_eq!(hash_path(&path).expect("hash"), before);
+    assert_eq!(contents(&path), before);
     // A NaN put in by another program is named as such.
     let mut bytes = fs::read(&path).expect("bytes");
     let end = bytes.len();

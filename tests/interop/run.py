@@ -135,7 +135,7 @@ def run(directory):
         print(f"  dataset/{split}: {count} episodes by pyarrow, DuckDB, pandas and LeRobotDataset")
     for kind in ("dynamics", "policy"):
         print(f"  {kind}.safetensors: {weights(directory / f'{kind}.safetensors', kind, task)} parameters")
-    for name in ("plans", "training", "evaluation"):
+    for name in ("plans", "policy.training", "evaluation.episodes"):
         path = directory / f"{name}.parquet"
         table = pq.read_table(path)
         check_provenance(table.schema.metadata[b"hilt"], task, path)

@@ -4,9 +4,12 @@ use crate::scene;
 use crate::scripted::Script;
 use hilt::config::{PulseSettings, SimulateSettings};
 use hilt::demo::Episode;
+use hilt::error::Error;
+use hilt::interrupt::Interrupt;
 use hilt::robot::VELOCITY_LIMITS_RAD_S;
-use hilt::scene::Scene;
+use hilt::scene::{Obstacle, Scene};
 use hilt::sim::{Controller, Disturbance, run_episode};
+use hilt::state::Pose;
 use hilt::state::{ARM_JOINTS, Action, JOINTS};
 use hilt::tasks::{FailureClass, Observation, Task};
 
@@ -24,7 +27,8 @@ fn disturbance(settings: &SimulateSettings, index: u64) -> Disturbance {
 }
 
 fn run(scene: &Scene, controller: &mut dyn Controller, index: u64, max_steps: u32) -> Episode {
-    run_episode(index, scene, controller, &mut disturbance(&SimulateSettings::default(), index), max_steps)
+    let mut disturbance = disturbance(&SimulateSettings::default(), index);
+    run_episode(index, scene, controller, &mut disturbance, max_steps, &Interrupt::default()).expect("not interrupted")
 }
 
 /// The figure of merit of the scripted grasp under noise; the bound leaves room for the script, which is no planner.
@@ -132,4 +136,48 @@ fn a_command_that_is_no_number_ends_the_episode_unrecorded() {
     assert_eq!(episode.steps.len(), 5);
     assert!(!episode.success);
     episode.to_demo().expect("only finite numbers are recorded");
+}
+
+/// A box that touches the arm at rest, a block too light for single precision, numbers beyond it: the physics engine panics or ends in
+/// numbers that are none.
+#[test]
+fn an_episode_whose_simulation_breaks_down_is_a_failure_of_its_own_class_and_no_panic() {
+    let plain = scene(Task::PickUp, 0);
+    let touching = Obstacle { center_m: [0.0, 0.0, 0.3], size_m: [0.02; 3] };
+    let harmed = [
+        Scene { obstacles: vec![touching], ..plain.clone() },
+        Scene { block_mass_kg: 1e-21, ..plain.clone() },
+        Scene { block: Pose { position_m: [1e300, 0.0, 0.025], ..plain.block }, ..plain.clone() },
+        Scene { block: Pose { quaternion_xyzw: [0.0; 4], ..plain.block }, ..plain.clone() },
+        Scene { obstacles: vec![Obstacle { center_m: [1e39; 3], size_m: [1e300; 3] }], ..plain.clone() },
+        Scene { friction: f64::NAN, block_mass_kg: f64::INFINITY, ..plain.clone() },
+        Scene { block_mass_kg: -1.0, ..plain },
+    ];
+    for (number, scene) in harmed.iter().enumerate() {
+        let episode = run(scene, &mut Script::lift(&scene.block), 0, 100);
+        let finite = episode.steps.iter().all(|s| s.state.to_row().iter().all(|v| v.is_finite()));
+        assert!(!episode.success && finite && episode.steps.len() <= 100, "scene {number}");
+        if number < 2 {
+            assert_eq!(episode.failure, Some(FailureClass::SimulationBrokeDown), "scene {number}");
+        }
+    }
+    assert_eq!(FailureClass::SimulationBrokeDown.name(), "simulation_broke_down");
+}
+
+#[test]
+fn a_command_that_is_no_number_is_a_failure_of_its_own_class() {
+    let scene = scene(Task::PickUp, 0);
+    for bad in [f64::NAN, f64::INFINITY, 1e300] {
+        let episode = run(&scene, &mut Constant(std::array::from_fn(|i| if i == 3 { bad } else { 0.0 })), 0, 50);
+        assert_eq!((episode.failure, episode.steps.len()), (Some(FailureClass::CommandNotFinite), 0), "{bad}");
+    }
+}
+
+#[test]
+fn an_interrupt_ends_an_episode_within_a_step() {
+    let (scene, interrupt) = (scene(Task::PickUp, 0), Interrupt::default());
+    interrupt.raise(2);
+    let mut noise = disturbance(&SimulateSettings::default(), 0);
+    let ended = run_episode(0, &scene, &mut Constant([0.0; JOINTS]), &mut noise, 10_000, &interrupt);
+    assert!(matches!(ended, Err(Error::Interrupted)));
 }

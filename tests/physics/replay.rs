@@ -3,6 +3,7 @@
 use crate::scripted::Script;
 use crate::{distance, play, scene};
 use hilt::config::SimulateSettings;
+use hilt::interrupt::Interrupt;
 use hilt::sim::{Controller, Disturbance, World, run_episode};
 use hilt::state::State;
 use hilt::tasks::Task;
@@ -41,7 +42,7 @@ fn an_episode_repeats_bit_for_bit_on_any_thread() {
         let scene = scene(Task::Stack, 3);
         let mut script = Script::carry(&scene.block, scene.target_m());
         let mut noise = Disturbance::new(&SimulateSettings::default(), hilt::seed::stream(0, "simulate", 3));
-        run_episode(3, &scene, &mut script, &mut noise, 300)
+        run_episode(3, &scene, &mut script, &mut noise, 300, &Interrupt::default()).expect("not interrupted")
     };
     let here = run();
     let there = std::thread::spawn(run).join().expect("the thread ran");
@@ -54,7 +55,7 @@ fn recorded_actions_reproduce_the_recorded_states() {
     let scene = scene(Task::PickUp, 4);
     let mut script = Script::lift(&scene.block);
     let mut noise = Disturbance::new(&SimulateSettings::default(), hilt::seed::stream(0, "simulate", 4));
-    let episode = run_episode(4, &scene, &mut script, &mut noise, 200);
+    let episode = run_episode(4, &scene, &mut script, &mut noise, 200, &Interrupt::default()).expect("not interrupted");
     let demo = episode.to_demo().expect("a sound episode");
     let mut world = World::new(&scene);
     for t in 0..demo.len() {

@@ -3,6 +3,7 @@
 use crate::scripted::Script;
 use crate::{lowest_corner, lowest_of_robot, play, scene};
 use hilt::config::SimulateSettings;
+use hilt::math::sin_cos;
 use hilt::robot::{POSITION_LIMITS_RAD, VELOCITY_LIMITS_RAD_S};
 use hilt::scene::{Obstacle, Scene};
 use hilt::sim::{Controller, Disturbance, World};
@@ -56,7 +57,7 @@ fn free_motion_tracks_its_command_in_one_step() {
     let mut before = world.observe().state.q_rad;
     let mut still = [false; JOINTS];
     for t in 0..200 {
-        let swing = 0.8 * (PI * f64::from(t) * CONTROL_DT_S).sin();
+        let swing = 0.8 * sin_cos(PI * f64::from(t) * CONTROL_DT_S).0;
         let action = noise.apply(&VELOCITY_LIMITS_RAD_S.map(|limit| swing * limit));
         let after = step(&mut world, &action).state.q_rad;
         for i in 0..JOINTS {

@@ -26,7 +26,7 @@ const ARTEFACTS: [(&str, &str); 7] = [
     ("dataset/train", "dataset/train/meta/tasks.parquet"),
     ("policy.safetensors", "policy.safetensors"),
     ("evaluation.json", "evaluation.json"),
-    ("training.parquet", "training.parquet"),
+    ("policy.training.parquet", "policy.training.parquet"),
 ];
 
 /// Every command with every file it reads.
@@ -128,15 +128,16 @@ fn weights_of_another_kind_are_refused() {
     let with = |stage: &str, flag: &str, file: &str| {
         run.words(stage).into_iter().chain([flag.to_string(), run.name(file)]).collect::<Vec<_>>()
     };
+    fs::copy(run.at("policy.safetensors"), run.at("another.safetensors")).expect("copied");
     for (words, says) in [
-        (swapped(&run, "train", "dynamics.safetensors", "policy.safetensors"), "policy network, a dynamics network is needed"),
+        (swapped(&run, "train", "dynamics.safetensors", "another.safetensors"), "policy network, a dynamics network is needed"),
         (swapped(&run, "evaluate", "policy.safetensors", "dynamics.safetensors"), "dynamics network, a policy network is needed"),
         (swapped(&run, "evaluate", "policy.safetensors", "plans.parquet"), "plans.parquet"),
-        (swapped(&run, "simulate", "plans.parquet", "training.parquet"), "this is no table of plans"),
+        (swapped(&run, "simulate", "plans.parquet", "policy.training.parquet"), "this is no table of plans"),
     ] {
         run.refuses(words, &[says]);
     }
-    run.refuses(with("plan", "--log", "recordings"), &["recordings", "cannot create"]);
+    run.refuses(with("plan", "--log", "recordings"), &["recordings", "is a directory"]);
 }
 
 /// A stage's arguments with another file in one place.
@@ -209,7 +210,7 @@ fn places_that_cannot_be_written_are_refused_before_the_work() {
     }
     for stage in ["simulate", "convert"] {
         run.refuses(to(stage, "directory"), &["thesis.tex", "empty it or choose another place"]);
-        run.refuses(to(stage, "plans.parquet"), &["is a file, a directory is to be written"]);
+        run.refuses(to(stage, "policy.safetensors"), &["is a file, a directory is to be written"]);
     }
     run.refuses(run.render("--png", "directory"), &["is a directory, a file is to be written"]);
     assert!(Path::new(&run.name("directory/thesis.tex")).is_file());

@@ -1,6 +1,6 @@
 //! Files that are whole and sealed, but whose content cannot be used: numbers that are none, networks of other sizes.
 
-use crate::runs::Run;
+use crate::runs::{Run, hilt, text};
 use arrow_array::cast::AsArray;
 use arrow_array::types::Float32Type;
 use arrow_array::{Array, ArrayRef, FixedSizeListArray, Float32Array, RecordBatch};
@@ -8,6 +8,7 @@ use hilt::data::{recording, seal, table_file, weights};
 use hilt::demo::Step;
 use hilt::robot::urdf::urdf;
 use hilt::table::Values;
+use hilt::tasks::FailureClass;
 use parquet::arrow::ArrowWriter;
 use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
 use std::fs;
@@ -106,5 +107,22 @@ fn networks_of_another_size_are_refused() {
         weights::write(&path, kind, &own[1..], &own_meta, &origin).expect("written");
         small.refuses(small.words(stage), &[file, "is missing"]);
         weights::write(&path, kind, &own, &own_meta, &origin).expect("written");
+    }
+}
+
+#[test]
+fn a_failed_episode_is_left_out_with_its_class_in_words() {
+    let run = Run::finished();
+    let path = run.at("recordings/episode-00001.mcap");
+    let (mut episode, origin) = recording::read(&path).expect("a recording");
+    for class in FailureClass::ALL {
+        (episode.success, episode.failure) = (false, Some(class));
+        recording::write(&path, &episode, &urdf(), &origin).expect("written");
+        assert_eq!(recording::read(&path).expect("read again").0.failure, Some(class));
+        let output = hilt(run.words("convert"));
+        let stderr = text(&output.stderr);
+        assert_eq!(output.status.code(), Some(3), "{stderr}");
+        let said = format!("left out 1 of 4 episodes:\n  episode 1 failed, {}: {}", class.name(), class.words());
+        assert!(stderr.contains(&said), "{said}: {stderr}");
     }
 }

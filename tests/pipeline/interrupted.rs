@@ -1,10 +1,11 @@
-//! Ctrl-C in every stage: exit code 130, a word to the person, no trace in the files.
+//! Ctrl-C in every stage: exit code 130 (143 for SIGTERM), a word to the person, no trace in the files.
 
 use crate::runs::{HILT, Run, contents, text};
-use hilt::data::table_file;
+use hilt::data::{recording, table_file};
 use hilt::plan::{from_table, to_table};
 use std::fs;
 use std::os::unix::fs::symlink;
+use std::path::Path;
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
@@ -14,6 +15,8 @@ const SOON: Duration = Duration::from_millis(400);
 const PATIENCE: Duration = Duration::from_secs(20);
 /// Recordings that take seconds to read and to write.
 const MANY: usize = 4000;
+/// Recordings that take some tenths of a second to write as a dataset.
+const DISTINCT: u64 = 200;
 
 pub fn start(words: Vec<String>) -> Child {
     Command::new(HILT).args(words).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().expect("the binary runs")
@@ -40,7 +43,7 @@ fn interrupted_by(name: &str, run: &Run, words: Vec<String>, wait: Duration) {
     }
     let output = child.wait_with_output().expect("ended");
     let stderr = text(&output.stderr);
-    assert_eq!(output.status.code(), Some(130), "{what}: {stderr}");
+    assert_eq!(output.status.code(), Some(if name == "TERM" { 143 } else { 130 }), "{what}: {stderr}");
     assert!(stderr.contains("error: interrupted; no artefact was changed"), "{what}: {stderr}");
     assert!(output.stdout.is_empty(), "{what} printed a result");
     if what.contains("\"train\"") {
@@ -68,7 +71,7 @@ fn planning_learning_and_evaluation_stop() {
         long(&run, "train", &["--set", "train.epochs=1000000", "--method", "sc"]),
         long(&run, "evaluate", &["--episodes", "100000"]),
         by_planner,
-        long(&run, "evaluate", &["--episodes", "100000", "--record", &run.name("recordings")]),
+        long(&run, "evaluate", &["--episodes", "100000", "--record", &run.name("rollouts")]),
     ] {
         interrupted_by("INT", &run, words, SOON);
     }
@@ -86,6 +89,18 @@ fn simulation_stops() {
     interrupted_by("INT", &run, run.words("simulate"), SOON);
 }
 
+/// Many recordings, each a little different.
+fn distinct(one: &Path) -> tempfile::TempDir {
+    let dir = tempfile::tempdir().expect("temporary directory");
+    let (mut episode, origin) = recording::read(one).expect("a recording");
+    for index in 0..DISTINCT {
+        episode.index = index;
+        episode.steps[0].commanded[0] += 1e-3;
+        recording::write(&dir.path().join(recording::file_name(index)), &episode, "<robot/>", &origin).expect("written");
+    }
+    dir
+}
+
 #[test]
 fn conversion_and_inspection_stop_while_they_read_and_while_they_write() {
     let run = Run::finished();
@@ -95,17 +110,20 @@ fn conversion_and_inspection_stop_while_they_read_and_while_they_write() {
         symlink(&one, many.path().join(format!("episode-{index:05}.mcap"))).expect("linked");
     }
     let name = many.path().to_str().expect("UTF-8 path").to_string();
-    let words = long(&run, "convert", &[]).into_iter().map(|w| if w == run.name("recordings") { name.clone() } else { w });
-    let words: Vec<String> = words.collect();
-    interrupted_by("INT", &run, words.clone(), SOON);
+    let over = |dir: &tempfile::TempDir| -> Vec<String> {
+        let name = dir.path().to_str().expect("UTF-8 path");
+        long(&run, "convert", &[]).into_iter().map(|w| if w == run.name("recordings") { name.into() } else { w }).collect()
+    };
+    interrupted_by("INT", &run, over(&many), SOON);
     interrupted_by("INT", &run, vec!["inspect".into(), name], SOON);
 
     // While the dataset is being written, its unfinished directory stands beside its place.
     let before = contents(run.path());
-    let child = start(words);
+    let distinct = distinct(&one);
+    let child = start(over(&distinct));
     let started = Instant::now();
-    let writing =
-        || fs::read_dir(run.path()).expect("readable").flatten().any(|e| e.file_name().to_string_lossy().starts_with(".hilt-"));
+    let unfinished = |e: &fs::DirEntry| e.path().is_dir() && e.file_name().to_string_lossy().starts_with(".hilt-");
+    let writing = || fs::read_dir(run.path()).expect("readable").flatten().any(|e| unfinished(&e));
     while !writing() {
         assert!(started.elapsed() < Duration::from_secs(120), "nothing is being written");
         std::thread::sleep(Duration::from_millis(2));
@@ -127,12 +145,44 @@ fn drawing_stops() {
 }
 
 #[test]
-fn a_second_signal_does_not_wait() {
+fn a_signal_that_arrives_twice_at_once_counts_once() {
     let run = Run::finished();
-    let child = start(long(&run, "plan", &["--episodes", "100000"]));
-    std::thread::sleep(SOON);
-    // The first may be enough; the second finds the process or nobody.
-    signal(&child, "INT");
-    let _ = Command::new("kill").args(["-INT", &child.id().to_string()]).stderr(Stdio::null()).status();
-    assert_eq!(child.wait_with_output().expect("ended").status.code(), Some(130));
+    for name in ["INT", "TERM"] {
+        let child = start(long(&run, "train", &["--set", "train.warm_start_updates=10000000"]));
+        std::thread::sleep(SOON);
+        // As from a terminal or `timeout`: to the group, and once more by `make`. Some find the process, some nobody.
+        for _ in 0..20 {
+            let _ = Command::new("kill").args([format!("-{name}"), child.id().to_string()]).stderr(Stdio::null()).status();
+        }
+        let output = child.wait_with_output().expect("ended");
+        let stderr = text(&output.stderr);
+        assert!(stderr.contains("policy.checkpoint.safetensors: run the same command with --resume"), "SIG{name}: {stderr}");
+        fs::remove_file(run.at("policy.checkpoint.safetensors")).expect("the checkpoint");
+    }
+}
+
+#[test]
+fn a_signal_ends_a_process_that_waits_for_its_input() {
+    let run = Run::finished();
+    let pipe = run.name("pipe");
+    assert!(Command::new("mkfifo").arg(&pipe).status().expect("mkfifo runs").success());
+    let over = |stage: &str, name: &str| -> Vec<String> {
+        run.words(stage).into_iter().map(|w| if w == run.name(name) { pipe.clone() } else { w }).collect()
+    };
+    for words in [
+        over("simulate", "plans.parquet"),
+        over("evaluate", "policy.safetensors"),
+        over("train", "dynamics.safetensors"),
+        vec!["settings".into(), "--pipeline".into(), pipe.clone()],
+    ] {
+        let what = format!("{words:?}");
+        let mut child = start(words);
+        std::thread::sleep(SOON);
+        assert!(child.try_wait().expect("waits").is_none(), "{what} did not wait for its input");
+        signal(&child, "TERM");
+        let sent = Instant::now();
+        let output = child.wait_with_output().expect("ended");
+        assert_eq!(output.status.code(), Some(143), "{what}: {}", text(&output.stderr));
+        assert!(sent.elapsed() < PATIENCE, "{what}");
+    }
 }

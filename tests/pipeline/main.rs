@@ -3,9 +3,12 @@
 mod bad_input;
 mod bad_numbers;
 mod demos;
+mod ends;
 mod fixtures;
 mod full_disk;
 mod interrupted;
+mod leaks;
+mod places;
 mod reproducible;
 mod resume;
 mod runs;

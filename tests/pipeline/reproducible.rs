@@ -1,7 +1,8 @@
 //! Same seed, same bytes: in any directory, with any number of threads. Another seed, other content.
 
-use crate::runs::{Run, contents, hilt};
+use crate::runs::{HILT, Run, STAGES, contents, hilt, text};
 use hilt::data::{recording, table_file, weights};
+use std::process::Command;
 
 /// All stages and pictures.
 fn whole(task: &'static str, seed: u64, threads: &str) -> Run {
@@ -23,12 +24,12 @@ fn the_same_bytes(task: &'static str) {
         "recordings/episode-00003.mcap",
         "dataset/train/data/chunk-000/file-000.parquet",
         "dynamics.safetensors",
-        "dynamics.parquet",
-        "pretraining.parquet",
+        "dynamics.errors.parquet",
+        "dynamics.pretraining.parquet",
         "policy.safetensors",
-        "training.parquet",
+        "policy.training.parquet",
         "evaluation.json",
-        "evaluation.parquet",
+        "evaluation.episodes.parquet",
         "a.gif",
         "a.png",
     ] {
@@ -59,7 +60,13 @@ fn another_seed_gives_other_content() {
     let (one, two) = (whole("pick-up", 3, "2"), whole("pick-up", 4, "2"));
     // Beyond the seed that the provenance names.
     let tables = |run: &Run, name: &str| table_file::read(&run.at(name)).expect("a table").0;
-    for name in ["plans.parquet", "pretraining.parquet", "dynamics.parquet", "training.parquet", "evaluation.parquet"] {
+    for name in [
+        "plans.parquet",
+        "dynamics.pretraining.parquet",
+        "dynamics.errors.parquet",
+        "policy.training.parquet",
+        "evaluation.episodes.parquet",
+    ] {
         assert_ne!(tables(&one, name), tables(&two, name), "{name}");
     }
     let episode = |run: &Run| recording::read(&run.at("recordings/episode-00000.mcap")).expect("a recording").0;
@@ -68,4 +75,32 @@ fn another_seed_gives_other_content() {
         let tensors = |run: &Run| weights::read(&run.at(file), kind).expect("weights").0;
         assert_ne!(tensors(&one), tensors(&two), "{file}");
     }
+}
+
+/// What a processor without fused multiply-add would run. `tests/qemu.sh` runs the whole binary as such a processor.
+#[test]
+fn every_kernel_gives_the_same_bytes() {
+    let fastest = Run::new("stack", 5).all(&["--set", "train.epochs=2"]);
+    let portable = Run::new("stack", 5);
+    for stage in STAGES {
+        let mut command = Command::new(HILT);
+        command.args(portable.words(stage)).args(["--set", "train.epochs=2"]).env("HILT_KERNEL", "portable");
+        let output = command.output().expect("the binary runs");
+        assert!(matches!(output.status.code(), Some(0 | 3)), "{stage}: {}", text(&output.stderr));
+    }
+    let (here, there) = (contents(fastest.path()), contents(portable.path()));
+    assert_eq!(here.keys().collect::<Vec<_>>(), there.keys().collect::<Vec<_>>());
+    for (name, bytes) in &here {
+        assert!(there[name] == *bytes, "{} differs between kernels", name.display());
+    }
+}
+
+#[test]
+fn a_kernel_that_does_not_exist_is_refused() {
+    let output =
+        Command::new(HILT).args(["settings", "--task", "stack"]).env("HILT_KERNEL", "sse9").output().expect("the binary runs");
+    assert_eq!(output.status.code(), Some(2));
+    let words = text(&output.stderr);
+    assert!(words.starts_with("error: HILT_KERNEL=\"sse9\" names no kernel") && words.lines().count() == 1, "{words}");
+    assert!(output.stdout.is_empty());
 }

@@ -40,7 +40,7 @@ fn done(words: Vec<String>) -> String {
 }
 
 fn results(run: &Run) -> [Vec<u8>; 2] {
-    ["policy.safetensors", "training.parquet"].map(|name| fs::read(run.at(name)).expect("a result"))
+    ["policy.safetensors", "policy.training.parquet"].map(|name| fs::read(run.at(name)).expect("a result"))
 }
 
 #[test]

@@ -2,7 +2,7 @@
 
 use super::features::{Feature, features};
 use super::meta::{CODEBASE_VERSION, INFO};
-use crate::data::{Provenance, json_file, provenance, read_bytes, seal};
+use crate::data::{ContentHash, Provenance, json_file, provenance, read_bytes, seal};
 use crate::error::{Error, Result};
 use crate::state::CONTROL_HZ;
 use crate::tasks::Task;
@@ -20,6 +20,8 @@ pub(super) struct Info {
     pub(super) provenance: Provenance,
     /// Content hashes by path below the root.
     pub(super) files: BTreeMap<String, String>,
+    /// Of the description itself.
+    pub(super) hash: ContentHash,
 }
 
 #[derive(Deserialize)]
@@ -53,7 +55,8 @@ pub(super) fn info(root: &Path) -> Result<Info> {
     let files = value.get_mut(provenance::KEY).and_then(|h| h.get_mut("files")).map(Value::take).unwrap_or_default();
     let files: BTreeMap<String, String> = serde_json::from_value(files).map_err(invalid)?;
     let Counts { fps, total_episodes: episodes, total_frames: frames } = counts;
-    Ok(Info { task: found.task, fps, episodes, frames, provenance: found, files })
+    let hash = ContentHash::of(&bytes);
+    Ok(Info { task: found.task, fps, episodes, frames, provenance: found, files, hash })
 }
 
 fn no_dataset(root: &Path) -> String {

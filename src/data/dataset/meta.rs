@@ -50,10 +50,21 @@ impl Place {
     }
 }
 
+/// Whether a path below a dataset's root is one of a dataset.
+pub(super) fn is_file(path: &Path) -> bool {
+    let Some(name) = path.to_str() else { return false };
+    let is_data = || {
+        let (chunk, file) = name.strip_prefix("data/chunk-")?.split_once("/file-")?;
+        let number = |text: &str| text.len() >= 3 && text.bytes().all(|b| b.is_ascii_digit());
+        Some(number(chunk) && number(file.strip_suffix(".parquet")?))
+    };
+    [INFO, STATS, TASKS, EPISODES].contains(&name) || is_data().unwrap_or(false)
+}
+
 /// Writes a file below `dir` and notes its hash.
 pub(super) fn put(dir: &Path, name: &str, bytes: &[u8], files: &mut BTreeMap<String, String>) -> Result<()> {
     files.insert(name.into(), blake3::hash(bytes).to_hex().to_string());
-    atomic::write_bytes(&dir.join(name), bytes)
+    atomic::write_new(&dir.join(name), bytes)
 }
 
 /// Writes the whole `meta` folder; `files` are the hashes of the data files.
@@ -91,7 +102,7 @@ pub(super) fn write(
         features: InOrder(features.iter().map(|f| (f.name.to_string(), describe(f))).collect()),
         hilt: json!({ "files": files, "provenance": provenance, "seal": seal::blank() }),
     };
-    atomic::write_bytes(&dir.join(INFO), &seal::close(pretty(&info)))
+    atomic::write_new(&dir.join(INFO), &seal::close(pretty(&info)))
 }
 
 /// `meta/info.json`.

@@ -11,9 +11,11 @@ mod meta;
 mod read;
 mod split;
 mod stats;
+mod twins;
 
 pub use read::{Dataset, read, read_for};
 pub use split::split;
+pub use twins::{first_shared, first_twins};
 
 use super::{Provenance, atomic, parquet_file};
 use crate::demo::{Demo, Episode};
@@ -69,7 +71,7 @@ impl<'a> DatasetEpisode<'a> {
 /// holds something else; [`Error::Io`] when the system refuses.
 pub fn write(root: &Path, task: Task, episodes: &[DatasetEpisode], provenance: &Provenance) -> Result<()> {
     let content = Content { task, provenance, file_bytes: DATA_FILE_BYTES, interrupt: &Interrupt::default() };
-    atomic::write_dir(root, |name| matches!(name, "meta" | "data"), |dir| content.fill(dir, episodes))
+    atomic::write_dir(root, meta::is_file, |dir| content.fill(dir, episodes))
 }
 
 /// Writes training and validation datasets as `parent/train` and `parent/validation`, both or none. Without validation episodes
@@ -86,18 +88,19 @@ pub fn write_split(
     interrupt: &Interrupt,
 ) -> Result<()> {
     let content = Content { task, provenance, file_bytes: DATA_FILE_BYTES, interrupt };
-    atomic::write_dir(
-        parent,
-        |name| matches!(name, TRAIN | VALIDATION),
-        |dir| {
-            for (name, episodes) in [(TRAIN, train), (VALIDATION, validation)] {
-                if name == TRAIN || !episodes.is_empty() {
-                    content.fill(&dir.join(name), episodes)?;
-                }
+    atomic::write_dir(parent, is_file, |dir| {
+        for (name, episodes) in [(TRAIN, train), (VALIDATION, validation)] {
+            if name == TRAIN || !episodes.is_empty() {
+                content.fill(&dir.join(name), episodes)?;
             }
-            Ok(())
-        },
-    )
+        }
+        Ok(())
+    })
+}
+
+/// Whether a path below the two datasets is one of theirs.
+pub fn is_file(path: &Path) -> bool {
+    [TRAIN, VALIDATION].iter().any(|name| path.strip_prefix(name).is_ok_and(meta::is_file))
 }
 
 /// What the datasets of one call share.

@@ -5,7 +5,8 @@ use super::features::{
     ACTION, DONE, ENVIRONMENT, EPISODE, EXECUTED, FRAME, INDEX, Kind, NEXT_ENVIRONMENT, NEXT_STATE, REWARD, SOURCE, STATE,
     SUCCESS, features,
 };
-use crate::data::{Provenance, parquet_file, read_bytes};
+use super::meta::INFO;
+use crate::data::{ContentHash, Provenance, parquet_file, read_bytes};
 use crate::demo::Demo;
 use crate::error::{Error, Result};
 use crate::tasks::Task;
@@ -32,6 +33,8 @@ pub struct Dataset {
     pub source_episodes: Vec<u64>,
     /// Where the dataset came from.
     pub provenance: Provenance,
+    /// The files that were read, by path below the root.
+    pub files: BTreeMap<String, ContentHash>,
 }
 
 /// Reads a dataset root (`dataset/train` or `dataset/validation`).
@@ -44,13 +47,16 @@ pub fn read(root: &Path) -> Result<Dataset> {
     let info = check::info(root)?;
     let mut columns = Columns::default();
     let mut rewritten = None;
+    let mut files = BTreeMap::from([(INFO.to_string(), info.hash)]);
     for name in info.files.keys() {
         let path = root.join(name);
         if !path.is_file() {
             return Err(Error::input(&path, "is missing; the dataset is incomplete, run hilt convert again"));
         }
         let bytes = read_bytes(&path)?;
-        let untouched = info.files.get(name).is_some_and(|h| *h == blake3::hash(&bytes).to_hex().as_str());
+        let hash = ContentHash::of(&bytes);
+        let untouched = info.files.get(name).is_some_and(|h| *h == hash.to_string());
+        files.insert(name.clone(), hash);
         if !untouched && !parquet_file::is_foreign(&bytes) {
             return Err(Error::input(&path, "damaged: its content does not match meta/info.json; run hilt convert again"));
         }
@@ -61,7 +67,7 @@ pub fn read(root: &Path) -> Result<Dataset> {
             columns.append(&path, info.task, bytes)?;
         }
     }
-    let dataset = columns.into_dataset(root, info)?;
+    let dataset = columns.into_dataset(root, info, files)?;
     // What another program rewrote may break the rules above, which says more than this.
     match rewritten {
         Some(path) => Err(Error::input(&path, "was rewritten by another program; run hilt convert again")),
@@ -128,7 +134,7 @@ impl Columns {
         Ok(())
     }
 
-    fn into_dataset(self, root: &Path, info: Info) -> Result<Dataset> {
+    fn into_dataset(self, root: &Path, info: Info, files: BTreeMap<String, ContentHash>) -> Result<Dataset> {
         let ranges = self.episodes(root, &info)?;
         let mut dataset = Dataset {
             task: info.task,
@@ -138,6 +144,7 @@ impl Columns {
             successes: Vec::new(),
             source_episodes: Vec::new(),
             provenance: info.provenance,
+            files,
         };
         for (number, range) in ranges.into_iter().enumerate() {
             let wrong = |what: String| Error::input(root, format!("episode {number}: {what}"));

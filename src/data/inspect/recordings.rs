@@ -37,14 +37,14 @@ pub(super) fn one(path: &Path) -> Result<Value> {
 
 /// All recordings in a directory.
 pub(super) fn all(dir: &Path, interrupt: &Interrupt) -> Result<Value> {
-    let names = file_names(dir)?;
-    if names.is_empty() {
+    let files = recording::files(dir)?;
+    if files.is_empty() {
         return Err(Error::input(dir, "is neither a dataset nor a directory of recordings (episode-00000.mcap, ...)"));
     }
     let (mut episodes, mut origin) = (Vec::new(), None);
-    for name in &names {
+    for file in &files {
         interrupt.check()?;
-        let (episode, provenance) = recording::read(&dir.join(name))?;
+        let (episode, provenance) = recording::read(file)?;
         origin = Some(provenance);
         episodes.push(episode);
     }
@@ -67,19 +67,6 @@ pub(super) fn all(dir: &Path, interrupt: &Interrupt) -> Result<Value> {
         "episode_reward": statistics(episodes.iter().map(reward)),
     });
     Ok(answer("recordings", &origin, rest))
-}
-
-/// Names of the recordings in a directory, sorted.
-fn file_names(dir: &Path) -> Result<Vec<String>> {
-    let mut names = Vec::new();
-    for entry in std::fs::read_dir(dir).map_err(|e| Error::io(dir, "read", e))? {
-        let name = entry.map_err(|e| Error::io(dir, "read", e))?.file_name().to_string_lossy().into_owned();
-        if recording::is_file_name(&name) {
-            names.push(name);
-        }
-    }
-    names.sort();
-    Ok(names)
 }
 
 fn moments(episode: &Episode) -> impl Iterator<Item = &Step> {

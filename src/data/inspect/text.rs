@@ -1,5 +1,6 @@
 //! An answer of `inspect` in words: plain fields as lines, then nested objects, indented, and lists of objects as tables.
 
+use crate::math::log10;
 use serde_json::{Map, Value};
 
 /// Significant digits of a number.
@@ -106,7 +107,7 @@ fn number(value: f64) -> String {
     if value == 0.0 {
         return "0".into();
     }
-    let magnitude = value.abs().log10().floor() as i32;
+    let magnitude = log10(value.abs()).floor() as i32;
     if !(-4..=DIGITS).contains(&magnitude) {
         return format!("{value:.*e}", DIGITS as usize - 1);
     }

@@ -17,7 +17,7 @@ mod foxglove;
 
 pub use foxglove::{BASE_FRAME, BLOCK_FRAME, WORLD_FRAME};
 
-use super::{Provenance, atomic, proto, provenance, read_bytes, seal};
+use super::{ContentHash, Provenance, atomic, proto, provenance, read_bytes, seal};
 use crate::demo::Episode;
 use crate::error::{Error, Result};
 use crate::robot::Arm;
@@ -30,7 +30,7 @@ use prost::Message;
 use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::io::Cursor;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// Duration of a control step on the clock of the file \[ns\].
 const STEP_NS: u64 = 1_000_000_000 / CONTROL_HZ as u64;
@@ -50,24 +50,51 @@ pub fn file_name(index: u64) -> String {
     format!("episode-{index:05}.mcap")
 }
 
-/// Whether a name is one that [`file_name`] gives.
-pub fn is_file_name(name: &str) -> bool {
-    let digits = name.strip_prefix("episode-").and_then(|n| n.strip_suffix(".mcap"));
-    digits.is_some_and(|d| d.len() >= 5 && d.bytes().all(|b| b.is_ascii_digit()))
+/// The number in a name that [`file_name`] gives; `None` for every other name.
+pub fn number_of(name: &str) -> Option<u64> {
+    let digits = name.strip_prefix("episode-")?.strip_suffix(".mcap")?;
+    digits.parse().ok().filter(|number| file_name(*number) == name)
 }
 
-/// Writes an episode. `urdf` is the robot's description; link names are those of [`crate::robot::jaco::LINK_NAMES`].
+/// Whether a path below a directory of recordings is one of a recording.
+pub fn is_file(path: &Path) -> bool {
+    path.to_str().and_then(number_of).is_some()
+}
+
+/// The recordings in a directory, by name; hidden and foreign files do not count.
 ///
 /// # Errors
-/// [`Error::Input`] when a step's conditions do not fit the task, [`Error::Io`] when the system refuses.
+/// [`Error::Io`] when it cannot be read.
+pub fn files(dir: &Path) -> Result<Vec<PathBuf>> {
+    let entries = std::fs::read_dir(dir).map_err(|e| Error::io(dir, "read", e))?;
+    let names = entries.map(|entry| entry.map(|e| e.file_name())).collect::<std::io::Result<Vec<_>>>();
+    let names = names.map_err(|e| Error::io(dir, "read", e))?;
+    let mut files: Vec<PathBuf> = names.iter().filter(|n| is_file(Path::new(n))).map(|n| dir.join(n)).collect();
+    files.sort();
+    Ok(files)
+}
+
+/// Writes an episode.
+///
+/// # Errors
+/// As [`encode`]; [`Error::Io`] when the system refuses.
 pub fn write(path: &Path, episode: &Episode, urdf: &str, provenance: &Provenance) -> Result<()> {
+    atomic::write_bytes(path, &encode(path, episode, urdf, provenance)?)
+}
+
+/// The bytes of the file that [`write()`] writes to `path`. `urdf` is the robot's description; link names are those of
+/// [`crate::robot::jaco::LINK_NAMES`].
+///
+/// # Errors
+/// [`Error::Input`] when a step's conditions do not fit the task.
+pub fn encode(path: &Path, episode: &Episode, urdf: &str, provenance: &Provenance) -> Result<Vec<u8>> {
     let expected = episode.scene.task.condition_names().len();
     if let Some(step) = episode.steps.iter().chain([&episode.last]).find(|s| s.conditions.len() != expected) {
         let message = format!("a step has {} conditions, {} has {expected}", step.conditions.len(), episode.scene.task);
         return Err(Error::input(path, message));
     }
-    let bytes = encode(episode, urdf, provenance).map_err(|e| Error::input(path, format!("cannot be encoded as MCAP: {e}")))?;
-    atomic::write_bytes(path, &seal::close(bytes))
+    let bytes = to_mcap(episode, urdf, provenance).map_err(|e| Error::input(path, format!("cannot be encoded as MCAP: {e}")))?;
+    Ok(seal::close(bytes))
 }
 
 /// Reads an episode, exactly as it was written.
@@ -76,16 +103,28 @@ pub fn write(path: &Path, episode: &Episode, urdf: &str, provenance: &Provenance
 /// [`Error::Input`] when the file is cut short, damaged, foreign or of another schema version, [`Error::Io`] when it cannot be read
 /// at all.
 pub fn read(path: &Path) -> Result<(Episode, Provenance)> {
+    decode(path, &read_bytes(path)?)
+}
+
+/// As [`read`], with the hash of the bytes that were read.
+///
+/// # Errors
+/// As [`read`].
+pub fn read_hashed(path: &Path) -> Result<(Episode, Provenance, ContentHash)> {
     let bytes = read_bytes(path)?;
+    decode(path, &bytes).map(|(episode, provenance)| (episode, provenance, ContentHash::of(&bytes)))
+}
+
+fn decode(path: &Path, bytes: &[u8]) -> Result<(Episode, Provenance)> {
     if !bytes.starts_with(mcap::MAGIC) {
         return Err(Error::input(path, "is not an MCAP file; expected a recording of hilt simulate"));
     }
     if !bytes.ends_with(mcap::MAGIC) {
         return Err(Error::input(path, "is an MCAP file without its end: it is cut short; run hilt simulate again"));
     }
-    seal::check(path, &bytes)?;
-    let provenance = read_provenance(path, &bytes)?;
-    let episode = decode::episode(&bytes).map_err(|message| Error::input(path, message))?;
+    seal::check(path, bytes)?;
+    let provenance = read_provenance(path, bytes)?;
+    let episode = decode::episode(bytes).map_err(|message| Error::input(path, message))?;
     Ok((episode, provenance))
 }
 
@@ -99,7 +138,7 @@ fn read_provenance(path: &Path, bytes: &[u8]) -> Result<Provenance> {
     Provenance::from_json(path, json)
 }
 
-fn encode(episode: &Episode, urdf: &str, provenance: &Provenance) -> McapResult<Vec<u8>> {
+fn to_mcap(episode: &Episode, urdf: &str, provenance: &Provenance) -> McapResult<Vec<u8>> {
     // Without the checksum of the whole data section, which would cover the seal; chunks keep theirs.
     let options = WriteOptions::new()
         .compression(Some(mcap::Compression::Zstd))

@@ -1,17 +1,22 @@
 //! The arithmetic that a network spends its time in: one kernel for all matrix products, which ends with the activation, and what moves
 //! samples into lanes. Each is written once over a `vector` of eight floats and compiled for AVX-512, for AVX2 with FMA and for any
-//! processor; which one runs is found out at run time. The first two give the same bits, the third others in the last places. All `unsafe`
-//! code of the library stands in this directory.
+//! processor; which one runs is found out at run time ([`choose`]). All give the same bits: where the processor has no fused multiply-add,
+//! `fused` does it in software, many times slower. All `unsafe` code of the library stands in this directory.
 
 #[cfg(target_arch = "x86_64")]
 mod avx2;
 #[cfg(target_arch = "x86_64")]
 mod avx512;
 mod entries;
+mod fused;
+mod path;
 mod tiles;
 mod vector;
 
 use super::lanes::{LANES, Lanes};
+use path::Path;
+
+pub use path::choose;
 
 /// A product: result\[p\]\[f\] = finish(start + sum over k of a(k, f) x\[p\]\[k\]).
 #[derive(Clone, Copy)]
@@ -177,28 +182,6 @@ fn separate_on(path: Path, rows: [&mut [f32]; LANES], panel: &[Lanes]) {
             Path::Avx512 | Path::Avx2 => avx2::separate(rows, panel),
             Path::Portable => entries::separate::<Lanes>(rows, panel),
         }
-    }
-}
-
-/// Which compilation runs.
-#[derive(Clone, Copy, Debug, PartialEq)]
-enum Path {
-    #[cfg(target_arch = "x86_64")]
-    Avx512,
-    #[cfg(target_arch = "x86_64")]
-    Avx2,
-    Portable,
-}
-
-impl Path {
-    fn best() -> Path {
-        #[cfg(target_arch = "x86_64")]
-        if std::arch::is_x86_feature_detected!("avx2") && std::arch::is_x86_feature_detected!("fma") {
-            let more_registers =
-                std::arch::is_x86_feature_detected!("avx512f") && std::arch::is_x86_feature_detected!("avx512vl");
-            return if more_registers { Path::Avx512 } else { Path::Avx2 };
-        }
-        Path::Portable
     }
 }
 

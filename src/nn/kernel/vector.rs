@@ -1,6 +1,7 @@
 //! Eight floats that instructions work on at once.
 
 use super::super::lanes::{LANES, Lanes};
+use super::fused;
 use super::tiles::Tile;
 
 /// A vector of eight floats.
@@ -21,7 +22,7 @@ pub trait Vector: Copy {
     unsafe fn times(self, factor: Self) -> Self;
     /// self / divisor.
     unsafe fn over(self, divisor: Self) -> Self;
-    /// self * factor + summand.
+    /// self * factor + summand, rounded once.
     unsafe fn times_plus(self, factor: Self, summand: Self) -> Self;
     /// The nearest number to self between -limit and limit; NaN stays.
     unsafe fn within(self, limit: f32) -> Self;
@@ -52,7 +53,7 @@ pub trait Isa {
     unsafe fn tiles<const S: usize>(panels: usize, entries: usize, count: usize, first: Tile);
 }
 
-/// What every processor has: as many sums as with AVX2.
+/// What every processor has: as many sums as with AVX2. Without an instruction for fused multiply-add, one is done in software.
 pub struct Portable;
 
 impl Isa for Portable {
@@ -105,7 +106,8 @@ impl Vector for Lanes {
     }
     #[inline(always)]
     unsafe fn times_plus(self, factor: Self, summand: Self) -> Self {
-        self * factor + summand
+        let fused = if cfg!(any(target_arch = "aarch64", target_feature = "fma")) { f32::mul_add } else { fused::times_plus };
+        Lanes(std::array::from_fn(|i| fused(self.0[i], factor.0[i], summand.0[i])))
     }
     #[inline(always)]
     unsafe fn within(self, limit: f32) -> Self {

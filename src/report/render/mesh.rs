@@ -1,5 +1,6 @@
 //! Closed triangle meshes of the primitives, tessellated once in their own frame.
 
+use crate::math::sin_cos;
 use crate::robot::Shape;
 use nalgebra::{Isometry3, Rotation3, Vector3};
 use std::f64::consts::{FRAC_PI_2, TAU};
@@ -68,9 +69,9 @@ impl Mesh {
             let far = row > RINGS;
             let step = if far { row - RINGS - 1 } else { row };
             let elevation = FRAC_PI_2 * (step as f64 / RINGS as f64 - if far { 0.0 } else { 1.0 });
-            let (up, out) = elevation.sin_cos();
+            let (up, out) = sin_cos(elevation);
             for k in 0..AROUND {
-                let (sin, cos) = (TAU * k as f64 / AROUND as f64).sin_cos();
+                let (sin, cos) = sin_cos(TAU * k as f64 / AROUND as f64);
                 let normal = turn * Vector3::new(out * cos, out * sin, up);
                 let at = if far { to } else { from } + normal * radius;
                 mesh.vertices.push(Vertex { at: at.cast(), normal: normal.cast() });

@@ -1,0 +1,228 @@
+//! What a command reads and writes, checked before any work: nothing of the user's is replaced that the command does not replace on purpose.
+
+use super::Console;
+use crate::data::atomic::{self, Target};
+use crate::data::peek::{Format, Peeked, peek};
+use crate::data::{dataset, recording};
+use crate::error::{Error, Result};
+use std::ffi::OsStr;
+use std::fs;
+use std::os::unix::fs::MetadataExt;
+use std::path::{Path, PathBuf};
+
+/// What is written to a place.
+#[derive(Clone, Copy, Debug)]
+pub enum Content {
+    /// A table of this stage.
+    Table(&'static str),
+    /// Weights of this kind and stage.
+    Weights(&'static str, &'static str),
+    /// A summary of this stage.
+    Summary(&'static str),
+    /// A PNG picture.
+    Png,
+    /// A GIF animation.
+    Gif,
+    /// A directory of recordings of this stage.
+    Recordings(&'static str),
+    /// A directory with the two datasets.
+    Datasets,
+    /// What the command reads as well, and replaces on purpose.
+    Own,
+    /// Words of the process.
+    Log,
+}
+
+/// Endings of other formats; what follows another dot belongs to a name (policy-0.1).
+const ENDINGS: [&str; 13] =
+    ["parquet", "safetensors", "json", "png", "gif", "log", "mcap", "toml", "txt", "csv", "pt", "pth", "bin"];
+
+/// Inputs and outputs of one command.
+#[derive(Debug, Default)]
+pub struct Places {
+    reads: Vec<PathBuf>,
+    writes: Vec<(&'static str, PathBuf, Content)>,
+}
+
+impl Places {
+    /// None yet.
+    pub fn new() -> Self {
+        Places::default()
+    }
+
+    /// Adds an input.
+    pub fn read(mut self, path: &Path) -> Self {
+        self.reads.push(path.to_path_buf());
+        self
+    }
+
+    /// Adds inputs.
+    pub fn read_all<'a>(self, paths: impl IntoIterator<Item = &'a Path>) -> Self {
+        paths.into_iter().fold(self, Places::read)
+    }
+
+    /// Adds an output; `name` is the flag that sets it, or what it is.
+    pub fn write(mut self, name: &'static str, path: &Path, content: Content) -> Self {
+        self.writes.push((name, path.to_path_buf(), content));
+        self
+    }
+
+    /// Checks all of them, then begins the log.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] when an output has another format's ending, is an input or lies in one, is another output, or holds the artefact of
+    /// another stage or program; [`Error::Input`] and [`Error::Io`] when it cannot be written there.
+    pub fn check(mut self, console: &Console) -> Result<()> {
+        if let Some(log) = console.log_path() {
+            self = self.write("--log", log, Content::Log);
+        }
+        for (name, path, content) in &self.writes {
+            check_ending(name, path, *content)?;
+        }
+        self.check_apart()?;
+        for (name, path, content) in &self.writes {
+            check_held(name, path, *content)?;
+            match content {
+                Content::Recordings(_) => atomic::check_directory(path, recording::is_file)?,
+                Content::Datasets => atomic::check_directory(path, dataset::is_file)?,
+                _ => atomic::check_place(path)?,
+            }
+        }
+        console.open_log()
+    }
+
+    /// No output is an input, or another output, or stands inside one.
+    fn check_apart(&self) -> Result<()> {
+        for (i, (name, path, _)) in self.writes.iter().enumerate() {
+            let Some(place) = place_of(path)? else { continue };
+            for input in &self.reads {
+                let refused = |how: &str| {
+                    let (path, input) = (path.display(), input.display());
+                    Err(Error::Usage(format!("{name} {path}: {how} {input}, which this command reads; choose another place")))
+                };
+                match place_of(input)? {
+                    Some(other) if same(&place, &other) => return refused("is"),
+                    Some(other) if other.starts_with(&place) => return refused("would replace"),
+                    Some(other) if place.starts_with(&other) => return refused("lies in"),
+                    _ => {}
+                }
+            }
+            for (other_name, other, _) in &self.writes[..i] {
+                let apart = place_of(other)?
+                    .is_none_or(|other| !same(&place, &other) && !other.starts_with(&place) && !place.starts_with(&other));
+                if !apart {
+                    let (path, other) = (path.display(), other.display());
+                    let message =
+                        format!("{other_name} {other} and {name} {path} are written by this command, to one place; choose two");
+                    return Err(Error::Usage(message));
+                }
+            }
+        }
+        Ok(())
+    }
+}
+
+/// The place of a file or directory, links followed; `None` for a device or a pipe, which takes any number of readers and writers.
+fn place_of(path: &Path) -> Result<Option<PathBuf>> {
+    if let Ok(found) = fs::canonicalize(path)
+        && found.is_dir()
+    {
+        return Ok(Some(found));
+    }
+    match atomic::target(path) {
+        Ok(Target::File(place)) => Ok(Some(place)),
+        Ok(Target::Stream(_)) => Ok(None),
+        // Said better where it is opened or written.
+        Err(_) => Ok(Some(path.to_path_buf())),
+    }
+}
+
+/// The same file, by its place or by another name of it.
+fn same(one: &Path, other: &Path) -> bool {
+    let number = |path: &Path| fs::metadata(path).map(|found| (found.dev(), found.ino())).ok();
+    one == other || number(one).is_some_and(|n| number(other) == Some(n))
+}
+
+fn is_stream(path: &Path) -> bool {
+    matches!(atomic::target(path), Ok(Target::Stream(_)))
+}
+
+/// An output's name ends as its format does, so that other tools know it, and what goes beside it has a name of its own.
+fn check_ending(name: &str, path: &Path, content: Content) -> Result<()> {
+    let (ending, format) = match content {
+        Content::Table(_) => ("parquet", "a Parquet file"),
+        Content::Weights(..) => ("safetensors", "a safetensors file"),
+        Content::Summary(_) => ("json", "a JSON file"),
+        Content::Png => ("png", "a PNG picture"),
+        Content::Gif => ("gif", "a GIF animation"),
+        Content::Log => ("log", "a log"),
+        Content::Recordings(_) | Content::Datasets | Content::Own => return Ok(()),
+    };
+    if matches!(atomic::target(path)?, Target::Stream(_)) || path.extension() == Some(OsStr::new(ending)) {
+        return Ok(());
+    }
+    let known = path.extension().and_then(OsStr::to_str).is_some_and(|e| ENDINGS.contains(&e));
+    let better = if known { path.with_extension(ending) } else { PathBuf::from(format!("{}.{ending}", path.display())) };
+    let (shown, better) = (path.display(), better.display());
+    Err(Error::Usage(format!("{name} {shown}: {format} is written there, its name must end in .{ending}: {better}")))
+}
+
+/// What stands in an output's place must be of the same kind, from the same stage.
+fn check_held(name: &str, path: &Path, content: Content) -> Result<()> {
+    let (format, stage, kind) = match content {
+        Content::Table(stage) => (Format::Parquet, Some(stage), None),
+        Content::Weights(kind, stage) => (Format::Safetensors, Some(stage), Some(kind)),
+        Content::Summary(stage) => (Format::Json, Some(stage), None),
+        Content::Png => (Format::Png, None, None),
+        Content::Gif => (Format::Gif, None, None),
+        Content::Log | Content::Datasets | Content::Own => return Ok(()),
+        Content::Recordings(stage) => return check_recordings(name, path, stage),
+    };
+    if is_stream(path) || !path.is_file() {
+        return Ok(());
+    }
+    let found = peek(path).map_err(|e| Error::io(path, "read", e))?;
+    let Some(holds) = differs(&found, format, stage, kind) else { return Ok(()) };
+    let path = path.display();
+    Err(Error::Usage(format!("{name} {path}: holds {holds}, which would be lost; move it away or choose another name")))
+}
+
+/// Recordings in a directory are replaced by recordings of the same stage alone.
+fn check_recordings(name: &str, dir: &Path, stage: &'static str) -> Result<()> {
+    if !dir.is_dir() {
+        return Ok(());
+    }
+    for file in recording::files(dir)? {
+        let found = peek(&file).map_err(|e| Error::io(&file, "read", e))?;
+        if let Some(holds) = differs(&found, Format::Mcap, Some(stage), None) {
+            let (dir, file) = (dir.display(), file.file_name().unwrap_or_default().display());
+            let message = format!("{name} {dir}: {file} in it holds {holds}, which would be lost; choose another directory");
+            return Err(Error::Usage(message));
+        }
+    }
+    Ok(())
+}
+
+/// In words, what a file holds that must not be replaced by `format`, `stage` and `kind`. A file that was cut short tells nothing, and is no loss.
+fn differs(found: &Peeked, format: Format, stage: Option<&str>, kind: Option<&str>) -> Option<String> {
+    if found.format == Format::Empty || (found.format == format && !found.whole) {
+        return None;
+    }
+    if found.format != format {
+        return Some("a file of another format".into());
+    }
+    match (stage, &found.stage) {
+        (None, _) => None,
+        (Some(_), None) => Some("a file that hilt did not write".into()),
+        (Some(stage), Some(other)) if stage != other => Some(format!("an artefact of hilt {other}")),
+        _ => match (kind, &found.kind) {
+            (Some(kind), Some(other)) if kind != other => Some(format!("weights of another kind, a {other}")),
+            _ => None,
+        },
+    }
+}
+
+/// A file that goes beside `out`: its name with `ending` in place of the format's own, which [`Places`] has checked.
+pub fn beside(out: &Path, ending: &str) -> PathBuf {
+    out.with_extension(ending)
+}
