@@ -27,8 +27,8 @@ fn alive(group: &str) -> usize {
 
 #[test]
 fn a_signal_reaches_training_and_make_waits_for_its_checkpoint() {
-    // What `kill` sends goes to make alone, which passes it on; Ctrl-C goes to the whole group.
-    for (name, to_all) in [("TERM", false), ("INT", true)] {
+    // What `kill` sends goes to make alone, which passes it on; Ctrl-C goes to the whole group; what `timeout` sends goes both ways.
+    for (name, to_all) in [("TERM", false), ("INT", true), ("TERM", true)] {
         let run = Run::finished();
         let set = format!("SET={TINY} train.warm_start_updates=10000000");
         let mut make = command(run.tree.path(), &["all", &set, "CHECKPOINT=1"]).process_group(0).spawn().expect("make runs");
