@@ -41,7 +41,7 @@ RUN = --threads $(THREADS) --log $(DIR)/logs/$(1).log
 # Exit code 3 says that episodes were dropped, counted and named; the rest of the artefact is whole.
 DONE = || test $$? -eq 3
 
-.PHONY: all smoke test check interop bench help clean-runs build need-cargo FORCE
+.PHONY: all smoke test check interop qemu bench help clean-runs build need-cargo FORCE
 
 all: $(DIR)/evaluation.json ## run every stage of TASK; writes RUNS/TASK/policy.safetensors and RUNS/TASK/evaluation.json
 
@@ -107,6 +107,9 @@ check: need-cargo ## what CI runs: format, lints, documentation, tests
 interop: build ## tiny runs of all tasks, read by mcap, pyarrow, DuckDB, pandas, LeRobot and safetensors (needs Python 3.12)
 	for task in $(TASKS); do $(MAKE) --no-print-directory all TASK=$$task RUNS=$(RUNS)/smoke SET="$(SMOKE)"; done
 	tests/interop/run.sh $(RUNS)/smoke
+
+qemu: build ## the same bytes as processors with and without FMA, all kernels, another libm (needs qemu-user and cc; minutes)
+	tests/qemu.sh
 
 bench: need-cargo ## measure planner, simulator and training
 	cargo bench --locked
