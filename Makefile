@@ -81,7 +81,7 @@ OF := $(patsubst %,-%,$(filter-out hil,$(METHOD)))
 FLAGS := --pipeline $(call word-of,$(PIPELINE)) --task $(TASK) --seed $(SEED) $(if $(strip $(SET)),--sets $(call word-of,$(SET)))
 RUN = --threads $(THREADS) --log $(DIR)/logs/$(1).log
 SETTINGS := $(HILT) settings $(FLAGS) --threads $(THREADS)
-MADE := tools/made.sh $(DIR) $(METHOD)
+MADE := pipelines/made.sh $(DIR) $(METHOD)
 
 PLANS      := $(DIR)/plans.parquet
 RECORDINGS := $(DIR)/recordings
@@ -91,7 +91,7 @@ POLICY     := $(DIR)/policy$(OF).safetensors
 EVALUATION := $(DIR)/evaluation$(OF).json
 ARTEFACTS  := $(PLANS) $(RECORDINGS) $(DATASET) $(DYNAMICS) $(POLICY) $(EVALUATION)
 
-.PHONY: all stages smoke test check interop bench help clean-runs build need-cargo FORCE $(ARTEFACTS)
+.PHONY: all stages smoke test check interop qemu bench help clean-runs build need-cargo FORCE $(ARTEFACTS)
 
 all: $(EVALUATION) ## run every stage of TASK; writes RUNS/TASK/policy.safetensors and RUNS/TASK/evaluation.json
 	@$(MADE) result
@@ -196,6 +196,9 @@ check: need-cargo ## what CI runs: format, lints, documentation, tests
 interop: build ## tiny runs of all tasks, read by mcap, pyarrow, DuckDB, pandas, LeRobot and safetensors (needs Python 3.12)
 	for task in $(TASKS); do $(MAKE) --no-print-directory all TASK=$$task RUNS=$(RUNS)/smoke SET="$(SMOKE)"; done
 	tests/interop/run.sh $(RUNS)/smoke
+
+qemu: build ## the same bytes as processors with and without FMA, all kernels, another libm (needs qemu-user and cc; minutes)
+	tests/qemu.sh
 
 bench: need-cargo ## measure planner, simulator and training
 	cargo bench --locked

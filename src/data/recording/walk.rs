@@ -159,7 +159,7 @@ impl Unpacker {
     }
 }
 
-fn metadata_entries(mut fields: Fields) -> Result<(&str, BTreeMap<&str, &str>), String> {
+fn metadata_entries<'a>(mut fields: Fields<'a>) -> Result<(&'a str, BTreeMap<&'a str, &'a str>), String> {
     let (name, mut entries) = (fields.text()?, Fields(fields.bytes32()?));
     let mut found = BTreeMap::new();
     while !entries.0.is_empty() {
