@@ -22,7 +22,7 @@ fn only(dir: &Path, names: &[&str]) {
     }
 }
 
-/// What the Makefile and tools/made.sh call.
+/// What the Makefile and pipelines/made.sh call.
 const NEEDED: [&str; 20] = [
     "awk", "cat", "cp", "env", "bash", "find", "grep", "ln", "make", "mkdir", "mv", "nproc", "rm", "sed", "tail", "touch", "tr",
     "wc", "xargs", "sort",
