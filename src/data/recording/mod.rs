@@ -25,6 +25,7 @@ use super::bytes::{Ends, Format};
 use super::{ContentHash, Provenance, atomic, proto, provenance, seal};
 use crate::demo::Episode;
 use crate::error::{Error, Result};
+use crate::interrupt;
 use crate::guard::guarded;
 use crate::robot::Arm;
 use crate::state::CONTROL_HZ;
@@ -75,6 +76,7 @@ pub fn is_file(path: &Path) -> bool {
 /// # Errors
 /// [`Error::Io`] when it cannot be read.
 pub fn files(dir: &Path) -> Result<Vec<PathBuf>> {
+    let _waits = interrupt::waiting();
     let entries = std::fs::read_dir(dir).map_err(|e| Error::io(dir, "read", e))?;
     let names = entries.map(|entry| entry.map(|e| e.file_name())).collect::<std::io::Result<Vec<_>>>();
     let names = names.map_err(|e| Error::io(dir, "read", e))?;
