@@ -3,17 +3,21 @@
 TASK   ?= pick-up
 RUNS   ?= runs
 SEED   ?= 0
-# Worker threads; no result depends on them.
-THREADS ?= $(shell nproc 2>/dev/null || echo 2)
 # best: every documented mend; paper: as literal as can work.
 PRESET ?= best
 PIPELINE ?= $(if $(filter paper,$(PRESET)),pipelines/paper/$(TASK).toml,pipelines/$(TASK).toml)
-# hil: hybrid imitation learning; bc: behavior cloning; sc: state cloning.
+# hil: hybrid imitation learning; bc: behavior cloning; sc: state cloning. Each has a policy of its own in RUNS/TASK; all share the demos.
 METHOD ?= hil
 # 1: an interrupted training goes on from its checkpoint.
 RESUME ?=
-# Overrides, separated by blanks: SET="plan.speed=0.5 train.rho=0.3".
+# Seconds between two checkpoints of training.
+CHECKPOINT ?= 60
+# Overrides, separated by blanks: SET="plan.speed=0.5 train.rho=0.3"; a blank inside brackets or quotes belongs to the value.
 SET    ?=
+# Worker threads; no result depends on them.
+ifeq ($(origin THREADS),undefined)
+  THREADS := $(shell nproc 2>/dev/null || sysctl -n hw.ncpu 2>/dev/null || echo 2)
+endif
 
 SHELL := /bin/bash
 .SHELLFLAGS := -eu -o pipefail -c
@@ -22,78 +26,163 @@ SHELL := /bin/bash
 .DEFAULT_GOAL := help
 MAKEFLAGS += --no-builtin-rules
 
+# --- the variables, refused before anything is done ---------------------------------------------------------------------------------
+
+define newline
+
+
+endef
+# What was typed, to the letter: a dollar sign in it names no variable, a line break is a blank.
+typed = $(subst $(newline), ,$(if $(filter file,$(origin $(1))),$($(1)),$(value $(1))))
+override TASK       := $(strip $(call typed,TASK))
+override RUNS       := $(call typed,RUNS)
+override SEED       := $(strip $(call typed,SEED))
+override PRESET     := $(strip $(call typed,PRESET))
+override PIPELINE   := $(call typed,PIPELINE)
+override METHOD     := $(strip $(call typed,METHOD))
+override RESUME     := $(strip $(call typed,RESUME))
+override CHECKPOINT := $(strip $(call typed,CHECKPOINT))
+override SET        := $(call typed,SET)
+override THREADS    := $(strip $(call typed,THREADS))
+
 TASKS := pick-up pick-and-place stack
 PRESETS := best paper
-ifneq ($(filter-out $(TASKS),$(TASK)),)
-  $(error unknown TASK "$(TASK)"; allowed: $(TASKS))
-endif
-ifneq ($(filter-out $(PRESETS),$(PRESET)),)
-  $(error unknown PRESET "$(PRESET)"; allowed: $(PRESETS))
-endif
+METHODS := hil bc sc
 
-CARGO := $(shell command -v cargo 2>/dev/null)
-HILT := $(or $(CARGO_TARGET_DIR),target)/release/hilt
-SOURCES := $(shell find src pipelines proto build.rs Cargo.toml Cargo.lock -type f 2>/dev/null)
+# Characters that mean something to make or to a shell.
+ODD := ' " ` \ : ; % & | < > ( ) { } [ ] * ? ! ~ = $$ \#
+is-odd = $(strip $(foreach c,$(ODD),$(findstring $c,$(1))) $(word 2,x$(1)x))
+# As one word of a command line.
+word-of = $(if $(call is-odd,$(1)),'$(subst ','\'',$(1))',$(1))
+one-of = $(if $(filter-out 1,$(words $($(1))))$(filter-out $(2),$($(1))),$(error $(1) is "$($(1))": it must be one of: $(2)))
+not-digits = $(subst 0,,$(subst 1,,$(subst 2,,$(subst 3,,$(subst 4,,$(subst 5,,$(subst 6,,$(subst 7,,$(subst 8,,$(subst 9,,$(1)))))))))))
+number = $(if $($(1)),$(if $(call not-digits,$($(1))),$(error $(1) is "$($(1))": it must be a whole number)),$(error $(1) is empty: it must be a whole number))
+
+$(call one-of,TASK,$(TASKS))
+$(call one-of,PRESET,$(PRESETS))
+$(call one-of,METHOD,$(METHODS))
+$(if $(RESUME),$(call one-of,RESUME,0 1))
+$(call number,SEED)
+$(call number,THREADS)
+$(call number,CHECKPOINT)
+$(if $(strip $(RUNS)),,$(error RUNS is empty: it must name a directory, for example RUNS=runs))
+$(if $(call is-odd,$(RUNS))$(filter -%,$(RUNS)),$(error RUNS is "$(RUNS)": it must name a directory without blanks, without a leading - and without any of $(ODD)))
+$(if $(strip $(PIPELINE)),,$(error PIPELINE is empty: it must name a file with settings, for example pipelines/$(TASK).toml))
+
+# --- the run ------------------------------------------------------------------------------------------------------------------------
+
+# A target directory of cargo's that make cannot name gets a link: target/release/hilt is there in any case.
+plain = $(if $(call is-odd,$(1)),,$(1))
+HILT := $(or $(call plain,$(CARGO_TARGET_DIR)),$(call plain,$(CARGO_BUILD_TARGET_DIR)),target)/release/hilt
 
 DIR := $(RUNS)/$(TASK)
-FLAGS = --pipeline $(PIPELINE) --task $(TASK) --seed $(SEED) $(addprefix --set ,$(SET))
+# What stands in the names of a method's own files.
+OF := $(patsubst %,-%,$(filter-out hil,$(METHOD)))
+FLAGS := --pipeline $(call word-of,$(PIPELINE)) --task $(TASK) --seed $(SEED) $(if $(strip $(SET)),--sets $(call word-of,$(SET)))
 RUN = --threads $(THREADS) --log $(DIR)/logs/$(1).log
-# Exit code 3 says that episodes were dropped, counted and named; the rest of the artefact is whole.
-DONE = || test $$? -eq 3
+SETTINGS := $(HILT) settings $(FLAGS) --threads $(THREADS)
+MADE := pipelines/made.sh $(DIR) $(METHOD)
 
-.PHONY: all smoke test check interop bench fuzz help clean-runs build need-cargo FORCE
+PLANS      := $(DIR)/plans.parquet
+RECORDINGS := $(DIR)/recordings
+DATASET    := $(DIR)/dataset
+DYNAMICS   := $(DIR)/dynamics.safetensors
+POLICY     := $(DIR)/policy$(OF).safetensors
+EVALUATION := $(DIR)/evaluation$(OF).json
+ARTEFACTS  := $(PLANS) $(RECORDINGS) $(DATASET) $(DYNAMICS) $(POLICY) $(EVALUATION)
 
-all: $(DIR)/evaluation.json ## run every stage of TASK; writes RUNS/TASK/policy.safetensors and RUNS/TASK/evaluation.json
+.PHONY: all stages smoke test check interop qemu bench fuzz help clean-runs build need-cargo FORCE $(ARTEFACTS)
 
-# --- the stages -----------------------------------------------------------------------------------------------------------------
+all: $(EVALUATION) ## run every stage of TASK; writes RUNS/TASK/policy.safetensors and RUNS/TASK/evaluation.json
+	@$(MADE) result
 
-$(DIR)/plans.parquet: $(DIR)/settings/plan.toml | $(HILT)
-	$(HILT) plan $(FLAGS) $(call RUN,plan) --out $@ $(DONE)
+# Up to one artefact. Settings are refused before anything is touched; what is out of date is asked of a binary that is up to date.
+$(PLANS):      LAST := plan
+$(RECORDINGS): LAST := simulate
+$(DATASET):    LAST := convert
+$(DYNAMICS):   LAST := pretrain
+$(POLICY):     LAST := train$(OF)
+$(EVALUATION): LAST := evaluate$(OF)
+$(ARTEFACTS): $(HILT)
+	@$(SETTINGS) > /dev/null
+	@$(MAKE) --no-print-directory stages LAST=$(LAST)
 
-$(DIR)/recordings: $(DIR)/plans.parquet $(DIR)/settings/simulate.toml | $(HILT)
-	$(HILT) simulate $(FLAGS) $(call RUN,simulate) --plans $< --out $@ $(DONE)
+# --- the stages ---------------------------------------------------------------------------------------------------------------------
 
-$(DIR)/dataset: $(DIR)/recordings $(DIR)/settings/convert.toml | $(HILT)
-	$(HILT) convert $(FLAGS) $(call RUN,convert) --recordings $< --out $@ $(DONE)
+# A stage's target says what its artefact was made with and how large it was left: DIR/settings/STAGE.toml, written when the stage has
+# succeeded. A run that fails or is stopped leaves it, and the artefact, as they are.
+STAMP := $(DIR)/settings
+STAGE_GOAL := $(filter stages,$(MAKECMDGOALS))
+stages: $(STAMP)/$(LAST).toml
+	@:
 
-$(DIR)/dynamics.safetensors: $(DIR)/dataset $(DIR)/settings/pretrain.toml | $(HILT)
-	$(HILT) pretrain $(FLAGS) $(call RUN,pretrain) --dataset $< --out $@
-
-$(DIR)/policy.safetensors: $(DIR)/dynamics.safetensors $(DIR)/settings/train.toml | $(HILT)
-	$(HILT) train $(FLAGS) $(call RUN,train) --method $(METHOD) --dataset $(DIR)/dataset --dynamics $< --out $@ $(if $(filter-out 0,$(RESUME)),--resume)
-
-$(DIR)/evaluation.json: $(DIR)/policy.safetensors $(DIR)/settings/evaluate.toml | $(HILT)
-	$(HILT) evaluate $(FLAGS) $(call RUN,evaluate) --policy $< --out $@
-
-# The settings that a stage reads, written anew only when they change: so a changed key reruns its stage and what follows, no more.
-$(DIR)/settings/%.toml: FORCE | $(HILT)
-	@mkdir -p $(@D)
-	@{ $(HILT) settings $(FLAGS) --stage $*; echo '# method $(if $(filter train,$*),$(METHOD),-)'; } > $@.new || { rm -f $@.new; exit 2; }
-	@if cmp -s $@.new $@; then rm $@.new; else mv $@.new $@; fi
-
-.SECONDARY:
+ifneq ($(STAGE_GOAL),)
+# Stages whose settings or artefacts are others than those that make left.
+$(patsubst %,$(STAMP)/%.toml,$(shell $(MADE) stale $(SETTINGS))): FORCE
+endif
 FORCE:
 
-# --- the binary -----------------------------------------------------------------------------------------------------------------
+# Dropped episodes are counted and named, and the rest of the artefact is whole. A stage is one command without a shell around it, so
+# that a signal to make reaches it and make waits for its end.
+$(STAMP)/plan.toml:
+	@$(MADE) start plan $(SETTINGS)
+	$(HILT) plan $(FLAGS) $(call RUN,plan) --allow-dropped --out $(PLANS)
+	@$(MADE) done plan
+
+$(STAMP)/simulate.toml: $(STAMP)/plan.toml
+	@$(MADE) start simulate $(SETTINGS)
+	$(HILT) simulate $(FLAGS) $(call RUN,simulate) --allow-dropped --plans $(PLANS) --out $(RECORDINGS)
+	@$(MADE) done simulate
+
+$(STAMP)/convert.toml: $(STAMP)/simulate.toml
+	@$(MADE) start convert $(SETTINGS)
+	$(HILT) convert $(FLAGS) $(call RUN,convert) --allow-dropped --recordings $(RECORDINGS) --out $(DATASET)
+	@$(MADE) done convert
+
+$(STAMP)/pretrain.toml: $(STAMP)/convert.toml
+	@$(MADE) start pretrain $(SETTINGS)
+	$(HILT) pretrain $(FLAGS) $(call RUN,pretrain) --dataset $(DATASET) --out $(DYNAMICS)
+	@$(MADE) done pretrain
+
+$(STAMP)/train$(OF).toml: $(STAMP)/pretrain.toml
+	@$(MADE) start train $(SETTINGS)
+	$(HILT) train $(FLAGS) $(call RUN,train$(OF)) --method $(METHOD) --dataset $(DATASET) --dynamics $(DYNAMICS) --out $(POLICY) --checkpoint-every $(CHECKPOINT) $(if $(filter 1,$(RESUME)),--resume)
+	@$(MADE) done train
+
+$(STAMP)/evaluate$(OF).toml: $(STAMP)/train$(OF).toml
+	@$(MADE) start evaluate $(SETTINGS)
+	$(HILT) evaluate $(FLAGS) $(call RUN,evaluate$(OF)) --policy $(POLICY) --out $(EVALUATION)
+	@$(MADE) done evaluate
+
+# --- the binary ---------------------------------------------------------------------------------------------------------------------
 
 build: $(HILT) ## build the optimised binary
 
-$(HILT): $(SOURCES) | need-cargo
-	cargo build --release --locked
-	@touch $@
+# An empty file is no binary.
+SOURCES := $(if $(STAGE_GOAL),,$(shell find src pipelines proto build.rs Cargo.toml Cargo.lock -type f 2>/dev/null || true; test -s $(HILT) || echo FORCE))
+
+# cargo says where it built: its own settings may name another directory or another target.
+$(HILT): $(SOURCES)
+	@command -v cargo > /dev/null || { echo "make: $@ is missing or older than its sources, and cargo is missing: install Rust from https://rustup.rs and open a new shell" >&2; exit 1; }
+	@echo cargo build --release --locked
+	@built=$$(cargo build --release --locked --message-format json-render-diagnostics | sed -n 's/.*"executable":"\([^"]*\)".*/\1/p' | tail -n 1); \
+	if test -s "$$built" && ! test "$$built" -ef $@; then mkdir -p $(@D) && ln -sf "$$built" $@; fi
+	@test -s $@ || { echo "make: cargo build has left no $@" >&2; exit 1; }
+	@touch -c $@
 
 need-cargo:
-	@$(if $(CARGO),:,echo "cargo is missing: install Rust from https://rustup.rs and open a new shell" >&2; exit 1)
+	@command -v cargo > /dev/null || { echo "make: cargo is missing: install Rust from https://rustup.rs and open a new shell" >&2; exit 1; }
 
-# --- checks ---------------------------------------------------------------------------------------------------------------------
+# --- checks -------------------------------------------------------------------------------------------------------------------------
 
 # A few episodes, a few updates: every stage runs, nothing is learned.
 SMOKE := plan.episodes=12 pretrain.epochs=2 train.warm_start_updates=50 train.epochs=1 train.min_updates=0 evaluate.episodes=8
+SMOKE_DIR := $(RUNS)/smoke/$(TASK)
 smoke: build ## a tiny run of all stages under RUNS/smoke/TASK, in less than a minute
-	$(MAKE) --no-print-directory all RUNS=$(RUNS)/smoke SET="$(SMOKE) $(SET)"
+	@$(MAKE) --no-print-directory all RUNS=$(RUNS)/smoke SET=$(call word-of,$(SMOKE) $(SET))
 	$(HILT) evaluate $(FLAGS) --threads $(THREADS) --policy planner --episodes 8
-	$(HILT) inspect $(RUNS)/smoke/$(TASK)/policy.safetensors
-	$(HILT) render $(RUNS)/smoke/$(TASK)/recordings/episode-00000.mcap --png --out $(RUNS)/smoke/$(TASK)/episode-00000.png
+	$(HILT) inspect $(SMOKE_DIR)/policy$(OF).safetensors
+	$(HILT) render $(SMOKE_DIR)/recordings/episode-00000.mcap --png --out $(SMOKE_DIR)/episode-00000.png
 
 test: need-cargo ## run all tests
 	cargo test --release --locked
@@ -108,17 +197,21 @@ interop: build ## tiny runs of all tasks, read by mcap, pyarrow, DuckDB, pandas,
 	for task in $(TASKS); do $(MAKE) --no-print-directory all TASK=$$task RUNS=$(RUNS)/smoke SET="$(SMOKE)"; done
 	tests/interop/run.sh $(RUNS)/smoke
 
+qemu: build ## the same bytes as processors with and without FMA, all kernels, another libm (needs qemu-user and cc; minutes)
+	tests/qemu.sh
+
 bench: need-cargo ## measure planner, simulator and training
 	cargo bench --locked
 
 fuzz: need-cargo ## give every reader of files mutated inputs, INPUTS of them (200000), and count what goes wrong
 	cargo bench --locked --bench fuzz -- --inputs $(or $(INPUTS),200000)
 
-clean-runs: ## remove what was made for TASK under RUNS
-	rm -rf $(DIR)
+clean-runs: ## remove what was made for TASK under RUNS; files that make did not make stay
+	@$(MADE) clean
 
 help: ## this list
 	@echo "make TARGET [TASK=pick-up|pick-and-place|stack] [RUNS=DIR] [SEED=N] [THREADS=N] [PRESET=best|paper] [PIPELINE=FILE]"
-	@echo "            [METHOD=hil|bc|sc] [RESUME=1] [SET=\"stage.key=value ...\"]"
-	@grep -hE '^[a-z-]+:.*## ' $(firstword $(MAKEFILE_LIST)) | sed -E 's/^([a-z-]+):.*## (.*)$$/  \1|\2/' | column -t -s '|'
+	@echo "            [METHOD=hil|bc|sc] [RESUME=1] [CHECKPOINT=SECONDS] [SET=\"stage.key=value ...\"]"
+	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  %-11s %s\n", $$1, $$2 }' $(firstword $(MAKEFILE_LIST))
+	@echo "RUNS is a directory without blanks and special characters. METHOD=bc writes policy-bc.safetensors and evaluation-bc.json beside those of hil."
 	@echo "Results are not rebuilt when only the source code changes: make clean-runs first."

@@ -29,7 +29,6 @@ const TAIL: f64 = 3.654_152_885_361_009;
 ///
 /// `rand_distr` takes logarithms of the system for one number in 3,700, those beyond [`TAIL`], and their last digit depends on the
 /// processor. These are computed again from the same draws: the last two, of which the first is the place in the tail.
-#[expect(clippy::disallowed_types, reason = "what depends on the processor is computed again")]
 pub fn normal(rng: &mut impl Rng) -> f64 {
     let mut remembering = Remembering { rng, last: [0; 2] };
     let value: f64 = StandardNormal.sample(&mut remembering);
@@ -82,7 +81,6 @@ mod tests {
     }
 
     #[test]
-    #[expect(clippy::disallowed_types, reason = "what the numbers must equal")]
     fn normal_numbers_are_those_of_rand_distr_but_for_the_last_digit_in_the_tail() {
         let (mut ours, mut theirs) = (stream(0, "normal", 0), stream(0, "normal", 0));
         let mut tail = [0.0; 2];

@@ -113,7 +113,9 @@ fn modules_import_only_from_their_left() {
 
 #[test]
 fn only_their_homes_know_the_big_crates() {
-    let homes: [(&str, &[&str]); 7] = [
+    let homes: [(&str, &[&str]); 8] = [
+        // Normal numbers differ in the last digit by processor unless `seed` draws them.
+        ("rand_distr", &["seed"]),
         ("rapier3d", &["sim"]),
         ("mcap", &["data"]),
         ("arrow_array", &["data"]),

@@ -26,6 +26,9 @@ pub struct SettingsArgs {
     /// Override one setting, in TOML; may be repeated (--set plan.speed=0.5 --set scene.yaw=true)
     #[arg(long, value_name = "STAGE.KEY=VALUE")]
     set: Vec<String>,
+    /// Overrides in one text, separated by blanks; a blank inside brackets or quotes belongs to the value (SET=... of make)
+    #[arg(long, value_name = "TEXT")]
+    sets: Option<String>,
     /// Seed of every random number
     #[arg(long, value_name = "S", default_value_t = 0)]
     pub seed: u64,
@@ -55,7 +58,8 @@ impl SettingsArgs {
         };
         let given: Vec<(String, String)> =
             flags.iter().filter_map(|(key, value)| value.as_ref().map(|v| (format!("{key}={v}"), flag_text(key, v)))).collect();
-        let sets: Vec<String> = self.set.iter().chain(given.iter().map(|(set, _)| set)).cloned().collect();
+        let mut sets = split(self.sets.as_deref().unwrap_or_default());
+        sets.extend(self.set.iter().chain(given.iter().map(|(set, _)| set)).cloned());
         let pipeline = Pipeline::load(&source, &sets).map_err(|e| in_words_of_flags(e, &given))?;
         check_ready_pose(&pipeline.scene)?;
         Ok(pipeline)
@@ -69,6 +73,29 @@ impl SettingsArgs {
         let provenance = Provenance::new(stage.name(), pipeline.task, pipeline.to_json(stage)?, self.seed);
         Ok(inputs.iter().fold(provenance, |provenance, (role, content)| provenance.with_input(role, content)))
     }
+}
+
+/// The words of a text; blanks inside brackets, braces and quotes separate nothing.
+fn split(text: &str) -> Vec<String> {
+    let (mut words, mut word, mut depth, mut quote) = (Vec::new(), String::new(), 0_usize, None);
+    for c in text.chars() {
+        match (quote, c) {
+            (Some(open), _) if c == open => quote = None,
+            (Some(_), _) => {}
+            (None, '"' | '\'') => quote = Some(c),
+            (None, '[' | '{') => depth += 1,
+            (None, ']' | '}') => depth = depth.saturating_sub(1),
+            (None, _) if c.is_whitespace() && depth == 0 => {
+                words.push(std::mem::take(&mut word));
+                continue;
+            }
+            (None, _) => {}
+        }
+        word.push(c);
+    }
+    words.push(word);
+    words.retain(|word| !word.is_empty());
+    words
 }
 
 /// `train.rho` and 2 as they were typed: `--rho 2`.
@@ -100,4 +127,21 @@ pub fn same_task(path: &Path, made_for: Task, task: Task) -> Result<()> {
         path,
         format!("was made for task {made_for}, but task {task} is asked for; give --task {made_for} or another file"),
     ))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::split;
+
+    #[test]
+    fn blanks_separate_overrides_except_inside_brackets_and_quotes() {
+        let obstacles = "scene.obstacles=[{center_m=[0.4, 0, 0.3], size_m=[0.1,0.1,0.1]}, {center_m=[0, 0, 1]}]";
+        let name = "train.alpha=\"adaptive it is\"";
+        assert_eq!(
+            split(&format!(" plan.speed=0.5  {obstacles}\t{name} a.b='] ['\n")),
+            ["plan.speed=0.5", obstacles, name, "a.b='] ['"]
+        );
+        assert_eq!(split(" \n"), [] as [&str; 0]);
+        assert_eq!(split("a.b=]1 c.d=[2 3"), ["a.b=]1", "c.d=[2 3"]);
+    }
 }

@@ -63,8 +63,8 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome> {
     say_of_runs(&kept, &context.console);
     let wanted = pipeline.convert.demos as usize;
     if kept.len() < wanted {
-        let (all, up_to) = (kept.len(), format!("convert.demos would take up to {wanted}"));
-        context.console.say(&format!("convert: takes all {all} demos; {up_to}, plan more episodes if you want more"));
+        let all = format!("{} demos where {wanted} are wanted at most (convert.demos)", kept.len());
+        context.console.say(&format!("convert: {all}: takes all of them; raise plan.episodes for more"));
     } else if wanted > 0 {
         kept.truncate(wanted);
     }

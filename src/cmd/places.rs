@@ -5,6 +5,7 @@ use crate::data::atomic::{self, Target};
 use crate::data::peek::{Format, Peeked, peek};
 use crate::data::{dataset, recording};
 use crate::error::{Error, Result};
+use crate::interrupt;
 use std::ffi::OsStr;
 use std::fs;
 use std::os::unix::fs::MetadataExt;
@@ -76,6 +77,8 @@ impl Places {
         if let Some(log) = console.log_path() {
             self = self.write("--log", log, Content::Log);
         }
+        // A place on a file system that does not answer: a signal ends the process, nothing is lost.
+        let waits = interrupt::waiting();
         for (name, path, content) in &self.writes {
             check_ending(name, path, *content)?;
         }
@@ -88,6 +91,7 @@ impl Places {
                 _ => atomic::check_place(path)?,
             }
         }
+        drop(waits);
         console.open_log()
     }
 

@@ -24,7 +24,7 @@ pub struct Args {
     out: Option<PathBuf>,
 }
 
-/// Samples of all plans together, which stay in memory until they are written: 100,000 plans of the usual length [control steps].
+/// Samples of all plans together, which stay in memory until they are written: 100,000 plans of the usual length \[control steps\].
 const MOST_SAMPLES: u64 = 15_000_000;
 
 /// For when no scene has a plan.

@@ -8,6 +8,7 @@ use crate::plan::{Plan, from_table};
 use crate::robot::urdf::urdf;
 use crate::seed;
 use crate::sim::{Disturbance, Follower, run_episode};
+use crate::tasks::FailureClass;
 use rayon::prelude::*;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -44,7 +45,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome> {
     let provenance = args.settings.provenance(Stage::Simulate, &pipeline, &[("plans", content)])?;
 
     let progress = context.console.progress("simulate", plans.len() as u64, "episodes");
-    let (solved, steps) = (AtomicU64::new(0), AtomicU64::new(0));
+    let (solved, broken, steps) = (AtomicU64::new(0), AtomicU64::new(0), AtomicU64::new(0));
     let record = |plan: &Plan, dir: &Path| -> Result<()> {
         context.interrupt.check()?;
         let noise = seed::stream(args.settings.seed, "simulate.noise", plan.index);
@@ -54,6 +55,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome> {
         let max_steps = pipeline.simulate.max_steps;
         let episode = run_episode(plan.index, &plan.scene, &mut follower, &mut disturbance, max_steps, &context.interrupt)?;
         solved.fetch_add(u64::from(episode.success), Ordering::Relaxed);
+        broken.fetch_add(u64::from(episode.failure == Some(FailureClass::SimulationBrokeDown)), Ordering::Relaxed);
         steps.fetch_add(episode.steps.len() as u64, Ordering::Relaxed);
         let file = dir.join(recording::file_name(plan.index));
         atomic::write_new(&file, &recording::encode(&file, &episode, &robot, &provenance)?)?;
@@ -62,6 +64,13 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome> {
     };
     atomic::write_dir(&out, recording::is_file, |dir| plans.par_iter().try_for_each(|plan| record(plan, dir)))?;
     progress.finish(&format!(", {} control steps, {} solved", steps.into_inner(), solved.into_inner()));
+    let broken = broken.into_inner();
+    if broken > 0 {
+        let keys = "scene.obstacles, scene.friction and scene.block_mass_kg";
+        context
+            .console
+            .say(&format!("simulate: the simulation broke down in {broken} episodes, recorded as failed: look at {keys}"));
+    }
     context.console.say(&format!("simulate: wrote {}", out.display()));
     Ok(Outcome::Done)
 }

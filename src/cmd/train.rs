@@ -41,7 +41,7 @@ pub struct Args {
     /// Weights of the dynamics network; bc needs none [default: runs/<TASK>/dynamics.safetensors]
     #[arg(long, value_name = "FILE.safetensors")]
     dynamics: Option<PathBuf>,
-    /// Weights to write [default: runs/<TASK>/policy.safetensors]
+    /// Weights to write [default: runs/<TASK>/policy.safetensors, of another method than hil policy-<METHOD>.safetensors]
     #[arg(long, value_name = "FILE.safetensors")]
     out: Option<PathBuf>,
     /// Metrics per epoch to write [default: beside the weights, their name with .training.parquet]
@@ -60,7 +60,10 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome> {
         args.settings.resolve(&[("train.rho", args.rho.map(|v| v.to_string())), ("train.alpha", args.alpha.clone())])?;
     let dir = path_or(args.dataset.as_deref(), pipeline.task, "dataset");
     let model = path_or(args.dynamics.as_deref(), pipeline.task, "dynamics.safetensors");
-    let out = path_or(args.out.as_deref(), pipeline.task, "policy.safetensors");
+    let method = format!("{:?}", args.method).to_lowercase();
+    // As `make all METHOD=bc` has it: another method replaces no policy of hil.
+    let name = if args.method == Method::Hil { "policy.safetensors".into() } else { format!("policy-{method}.safetensors") };
+    let out = path_or(args.out.as_deref(), pipeline.task, &name);
     let metrics = args.metrics.clone().unwrap_or_else(|| beside(&out, "training.parquet"));
     let needs_model = args.method != Method::Bc || args.dynamics.is_some();
     let kept = beside(&out, checkpoint::ENDING);
@@ -73,7 +76,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome> {
     let (dynamics, model) = needs_model.then(|| read_dynamics(&model, pipeline.task)).transpose()?.unzip();
     let inputs: Vec<_> = [("dataset", content)].into_iter().chain(model.map(|content| ("dynamics", content))).collect();
     let mut provenance = args.settings.provenance(Stage::Train, &pipeline, &inputs)?;
-    provenance.settings["method"] = format!("{:?}", args.method).to_lowercase().into();
+    provenance.settings["method"] = method.into();
 
     let (console, seed) = (&context.console, args.settings.seed);
     let resume = if args.resume { checkpoint::read(&kept, &provenance)? } else { None };

@@ -11,7 +11,7 @@ use toml::{Table, Value};
 /// A longer key is no slip of the finger, and takes long to compare.
 const LONGEST_KEY: usize = 64;
 /// Boxes of a scene: each is kept with every episode, and met by every distance of a plan.
-const MOST_OBSTACLES: usize = 100;
+pub(super) const MOST_OBSTACLES: usize = 100;
 /// Letters of a reason that are kept at each end.
 const KEPT_OF_REASON: usize = 120;
 
@@ -27,7 +27,10 @@ pub(super) fn resolve(table: Table, origin: &str) -> Result<Pipeline> {
         let hint = meant_variant(reason);
         Error::Usage(format!("{origin}: {}{value}: {}{hint}{allowed}", e.path(), shortened(reason)))
     })?;
-    for (key, value) in leaves(&pipeline.to_table()?) {
+    // The sections of learning check themselves, wherever their settings come from.
+    let others =
+        leaves(&pipeline.to_table()?).into_iter().filter(|(key, _)| !key.starts_with("pretrain.") && !key.starts_with("train."));
+    for (key, value) in others {
         if let Some(range) = Range::of(&key) {
             range.check(&key, &value).map_err(|why| Error::Usage(format!("{origin}: {why}")))?;
         }

@@ -10,7 +10,7 @@ pub struct ConvertSettings {
     pub train_per_validation: u32,
     /// Whether failed episodes stay in the dataset.
     pub keep_failed: bool,
-    /// Demos to take, the first that succeeded; 0 = all. Plan some more than this when pulses make some fail.
+    /// The most demos to take, the first that succeeded; 0 = all. Plan some more than this when pulses make some fail.
     pub demos: u64,
 }
 

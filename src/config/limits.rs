@@ -15,7 +15,7 @@ pub(super) fn within_ranges(section: &str, settings: &impl Serialize) -> Result<
     let table = Table::try_from(settings).map_err(|e| Error::Usage(format!("[{section}] cannot be written as TOML: {e}")))?;
     let whole = Table::from_iter([(section.to_string(), Value::Table(table))]);
     leaves(&whole).iter().try_for_each(|(key, value)| match Range::of(key) {
-        Some(range) if !range.holds(value) => refuse(key, value, &format!("from {range}")),
+        Some(range) if !range.holds(value) => refuse(key, value, &range.must_be()),
         _ => Ok(()),
     })
 }

@@ -11,7 +11,7 @@ use std::io::Read;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
-/// A pipeline file with every key is 4 kB long; this leaves room for comments and boxes [bytes].
+/// A pipeline file with every key is 4 kB long; this leaves room for comments and boxes \[bytes\].
 const LONGEST_FILE: u64 = 1 << 20;
 /// Parts of a dotted key: stage, section, key.
 const MOST_PARTS: usize = 3;

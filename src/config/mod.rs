@@ -18,7 +18,7 @@ pub use data::{ConvertSettings, EvaluateSettings};
 pub use load::{Preset, Source};
 pub use pretrain::PretrainSettings;
 pub use ranges::{MOST_LAYERS, MOST_STEPS, MOST_UNITS};
-pub use scene::{PlanSettings, PulseSettings, SceneSettings, SimulateSettings, Spread};
+pub use scene::{PlanSettings, PulseSettings, SceneSettings, SimulateSettings, Spread, check_scene};
 pub use train::TrainSettings;
 
 use crate::error::{Error, Result};

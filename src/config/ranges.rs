@@ -146,6 +146,15 @@ impl Range {
     pub fn check(self, key: &str, value: &Value) -> Result<(), String> {
         if self.holds(value) { Ok(()) } else { Err(format!("{key} = {value}: out of range; allowed: {self}")) }
     }
+
+    /// What a number must be.
+    pub fn must_be(self) -> String {
+        match (self.above_low || self.below_high, self.low, self.high) {
+            (true, ..) => self.to_string(),
+            (false, 0.0, 1.0) => "between 0 and 1".into(),
+            _ => format!("from {self}"),
+        }
+    }
 }
 
 impl fmt::Display for Range {

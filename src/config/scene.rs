@@ -1,8 +1,13 @@
 //! Settings of the scene, the planner and the simulation.
 
-use crate::scene::Obstacle;
+use super::check::MOST_OBSTACLES;
+use super::ranges::Range;
+use crate::scene::{Obstacle, Scene};
+use crate::state::{Context, Pose};
+use crate::tasks::Task;
 use rand::{Rng, RngExt};
 use serde::{Deserialize, Serialize};
+use toml::Value;
 
 /// A number of the scene: fixed, or drawn anew for every episode.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -64,6 +69,48 @@ impl Default for SceneSettings {
             obstacles: Vec::new(),
         }
     }
+}
+
+/// How far the length of a quaternion may be from 1: what rounding leaves is far less.
+const UNIT: f64 = 1e-3;
+
+/// Whether a scene from a file can be one: every number within what settings allow, turned by unit quaternions, with its task's context.
+///
+/// # Errors
+/// Says which number is none, and what is allowed.
+pub fn check_scene(scene: &Scene) -> Result<(), String> {
+    let number = |key: &str, value: f64| {
+        let range = Range::of(key).expect("every number of a scene has a range");
+        range.check(key, &Value::Float(value))
+    };
+    let point = |key: &str, [x, y, z]: [f64; 3]| [x, y, z].iter().try_for_each(|v| number(key, *v));
+    let pose = |name: &str, pose: &Pose| {
+        point("scene.obstacles.center_m", pose.position_m).map_err(|why| why.replace("scene.obstacles.center_m", name))?;
+        let length = pose.quaternion_xyzw.iter().map(|v| v * v).sum::<f64>().sqrt();
+        if (length - 1.0).abs() < UNIT {
+            Ok(())
+        } else {
+            Err(format!("the quaternion of {name} has length {length}, allowed: 1"))
+        }
+    };
+    number("scene.friction", scene.friction)?;
+    number("scene.block_mass_kg", scene.block_mass_kg)?;
+    pose("block", &scene.block)?;
+    match (scene.task, &scene.context) {
+        (Task::PickUp, Context::None) => {}
+        (Task::PickAndPlace, Context::Goal(goal)) => {
+            point("scene.obstacles.center_m", *goal).map_err(|why| why.replace("scene.obstacles.center_m", "goal"))?
+        }
+        (Task::Stack, Context::Base(base)) => pose("base", base)?,
+        (task, _) => return Err(format!("its goal or base block is not that of {task}")),
+    }
+    if scene.obstacles.len() > MOST_OBSTACLES {
+        return Err(format!("it has {} obstacles, allowed: up to {MOST_OBSTACLES}", scene.obstacles.len()));
+    }
+    scene.obstacles.iter().try_for_each(|o| {
+        point("scene.obstacles.center_m", o.center_m)?;
+        point("scene.obstacles.size_m", o.size_m)
+    })
 }
 
 /// `[plan]`: demonstrations as smooth joint trajectories.

@@ -12,12 +12,14 @@ pub mod json_file;
 mod json_text;
 mod litter;
 mod parquet_file;
+mod parquet_limits;
 pub mod peek;
 mod proto;
 pub mod provenance;
 pub mod recording;
 pub mod seal;
 pub mod table_file;
+mod thrift;
 pub mod weights;
 
 pub use inspect::{inspect, inspect_text};

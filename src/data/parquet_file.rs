@@ -1,7 +1,10 @@
 //! What all our Parquet files share: zstd, provenance and seal in the metadata, checked before decoding.
 
-use super::{Provenance, provenance, seal};
+use super::budget::Budget;
+use super::bytes::{Ends, Format};
+use super::{Provenance, parquet_limits, provenance, seal};
 use crate::error::{Error, Result};
+use crate::guard::guarded;
 use arrow_array::RecordBatch;
 use arrow_schema::{Schema, SchemaRef};
 use parquet::arrow::ArrowWriter;
@@ -69,9 +72,36 @@ pub(super) fn cannot_encode(path: &Path, error: impl std::fmt::Display) -> Error
     Error::input(path, format!("cannot be encoded as Parquet: {error}"))
 }
 
+/// What our Parquet files look like from outside.
+pub(super) const FORMAT: Format = Format {
+    most_bytes: 4 << 30,
+    reason: "100,000 plans have some 800 MB, and a file of a dataset is closed at 100 MB",
+    head: check_head,
+    ends: check_ends,
+};
+/// The format's name, at either end of a file.
+const MAGIC: &[u8] = b"PAR1";
+/// Who wrote a file is said behind its columns, at the end of its metadata.
+const WRITER_WITHIN: usize = 4096;
+
+fn check_head(path: &Path, head: &[u8]) -> Result<()> {
+    if head.starts_with(MAGIC) {
+        return Ok(());
+    }
+    Err(Error::input(path, "is not a Parquet file; expected one written by hilt"))
+}
+
+fn check_ends(path: &Path, ends: &Ends) -> Result<()> {
+    if ends.tail(path, MAGIC.len())?.as_ref() == MAGIC {
+        return Ok(());
+    }
+    Err(Error::input(path, "is a Parquet file without its end: it is cut short; run the stage that makes it again"))
+}
+
 /// Whether this is a Parquet file that another program wrote (or rewrote).
 pub(super) fn is_foreign(bytes: &[u8]) -> bool {
-    bytes.starts_with(b"PAR1") && bytes.ends_with(b"PAR1") && seal::find_last(bytes, CREATED_BY.as_bytes()).is_none()
+    let tail = &bytes[bytes.len().saturating_sub(WRITER_WITHIN)..];
+    bytes.starts_with(MAGIC) && bytes.ends_with(MAGIC) && seal::find_last(tail, CREATED_BY.as_bytes()).is_none()
 }
 
 /// Checks the seal, then decodes.
@@ -79,12 +109,7 @@ pub(super) fn is_foreign(bytes: &[u8]) -> bool {
 /// # Errors
 /// [`Error::Input`] with the reason.
 pub(super) fn open(path: &Path, bytes: Vec<u8>) -> Result<(SchemaRef, Vec<RecordBatch>)> {
-    if !bytes.starts_with(b"PAR1") {
-        return Err(Error::input(path, "is not a Parquet file; expected one written by hilt"));
-    }
-    if !bytes.ends_with(b"PAR1") {
-        return Err(Error::input(path, "is a Parquet file without its end: it is cut short; run the stage that makes it again"));
-    }
+    FORMAT.check(path, &bytes)?;
     if is_foreign(&bytes) {
         return Err(Error::input(path, "was written by another program than hilt; run the stage that makes it again"));
     }
@@ -92,13 +117,30 @@ pub(super) fn open(path: &Path, bytes: Vec<u8>) -> Result<(SchemaRef, Vec<Record
     decode(bytes).map_err(|e| Error::input(path, format!("cannot be decoded: {e}")))
 }
 
-/// All batches of a Parquet file.
+/// Rows that are decoded at once, where they are short.
+const ROWS_AT_ONCE: usize = 8192;
+/// Texts that are decoded at once take no more than this \[bytes\].
+const TEXTS_AT_ONCE: usize = 64 << 20;
+
+/// All batches of a Parquet file, as long as they are no larger than its size allows.
 pub(super) fn decode(bytes: Vec<u8>) -> std::result::Result<(SchemaRef, Vec<RecordBatch>), String> {
-    let builder = ParquetRecordBatchReaderBuilder::try_new(Bytes::from(bytes)).map_err(|e| e.to_string())?;
-    let schema = Arc::clone(builder.schema());
-    let reader = builder.build().map_err(|e| e.to_string())?;
-    let batches = reader.collect::<std::result::Result<Vec<_>, _>>().map_err(|e| e.to_string())?;
-    Ok((schema, batches))
+    let longest_text = parquet_limits::check(&bytes)?;
+    let rows = (TEXTS_AT_ONCE / longest_text.max(1)).clamp(1, ROWS_AT_ONCE);
+    let mut budget = Budget::new();
+    budget.allow_for(bytes.len());
+    guarded(|| {
+        let builder = ParquetRecordBatchReaderBuilder::try_new(Bytes::from(bytes)).map_err(|e| e.to_string())?;
+        let schema = Arc::clone(builder.schema());
+        let reader = builder.with_batch_size(rows).build().map_err(|e| e.to_string())?;
+        let mut batches = Vec::new();
+        for batch in reader {
+            let batch = batch.map_err(|e| e.to_string())?;
+            budget.take(batch.get_array_memory_size() as u64)?;
+            batches.push(batch);
+        }
+        Ok((schema, batches))
+    })
+    .unwrap_or_else(|_| Err("its inner structure is broken".into()))
 }
 
 /// The provenance in a schema's metadata.

@@ -1,6 +1,6 @@
 //! Tables (plans, metrics, evaluation logs) as Parquet; every column carries its description and unit in its own metadata.
 
-use super::{ContentHash, Provenance, atomic, parquet_file, read_bytes};
+use super::{ContentHash, Provenance, atomic, parquet_file};
 use crate::error::{Error, Result};
 use crate::table::{Column, Table, Values};
 use arrow_array::cast::AsArray;
@@ -79,7 +79,7 @@ pub fn read(path: &Path) -> Result<(Table, Provenance)> {
 /// # Errors
 /// As [`read`].
 pub fn read_hashed(path: &Path) -> Result<(Table, Provenance, ContentHash)> {
-    let bytes = read_bytes(path)?;
+    let bytes = parquet_file::FORMAT.read(path)?;
     let hash = ContentHash::of(&bytes);
     decode(path, bytes).map(|(table, provenance)| (table, provenance, hash))
 }

@@ -1,10 +1,12 @@
 //! Plans as a table and back.
 
 use super::{Plan, Waypoint};
-use crate::demo::Phase;
+use crate::config::{MOST_STEPS, check_scene};
+use crate::demo::{LARGEST_NUMBER, Phase};
 use crate::scene::Scene;
 use crate::state::{JOINT_NAMES, JOINTS};
 use crate::table::{Table, Values};
+use std::collections::HashSet;
 
 /// Plans as a table, one row per waypoint: `episode`, `step`, `phase`, `<joint>.q_rad` and `<joint>.dq_rad_s` per joint, and `scene`, the scene
 /// as JSON on the first row of each episode (empty text on the others).
@@ -47,12 +49,15 @@ pub fn from_table(table: &Table) -> Result<Vec<Plan>, String> {
     if let Some(c) = table.columns.iter().find(|c| c.values.len() != rows) {
         return Err(format!("column {} has {} rows, episode has {rows}", c.name, c.values.len()));
     }
-    let mut plans: Vec<Plan> = Vec::new();
+    let (mut plans, mut begun) = (Vec::<Plan>::new(), HashSet::new());
     for row in 0..rows {
         let at = |what: String| format!("row {row}: {what}");
         let number = |columns: &[&[f64]]| -> Result<[f64; JOINTS], String> {
             let values: [f64; JOINTS] = std::array::from_fn(|j| columns[j][row]);
-            match values.iter().position(|v| !v.is_finite()) {
+            match values.iter().position(|v| v.is_nan() || v.abs() > LARGEST_NUMBER) {
+                Some(j) if values[j].is_finite() => {
+                    Err(at(format!("{} is {}, no angle or velocity of an arm", JOINT_NAMES[j], values[j])))
+                }
                 Some(j) => Err(at(format!("{} is {}, not a finite number", JOINT_NAMES[j], values[j]))),
                 None => Ok(values),
             }
@@ -63,10 +68,11 @@ pub fn from_table(table: &Table) -> Result<Vec<Plan>, String> {
         let waypoint = Waypoint { phase, q_rad: number(&q)?, dq_rad_s: number(&dq)? };
         let index = u64::try_from(episodes[row]).map_err(|_| at(format!("episode {} is negative", episodes[row])))?;
         if steps[row] == 0 {
-            if plans.iter().any(|p| p.index == index) {
+            if !begun.insert(index) {
                 return Err(at(format!("episode {index} begins a second time")));
             }
             let scene: Scene = serde_json::from_str(&scenes[row]).map_err(|e| at(format!("the scene cannot be read: {e}")))?;
+            check_scene(&scene).map_err(|why| at(format!("the scene cannot be: {why}")))?;
             plans.push(Plan { index, scene, waypoints: vec![waypoint] });
             continue;
         }
@@ -74,6 +80,9 @@ pub fn from_table(table: &Table) -> Result<Vec<Plan>, String> {
         let plan = plan.ok_or_else(|| at(format!("episode {index} step {} does not follow the row before", steps[row])))?;
         if plan.waypoints[plan.waypoints.len() - 1].phase > phase {
             return Err(at(format!("phase {} comes after a later one", phase.name())));
+        }
+        if plan.waypoints.len() > MOST_STEPS as usize {
+            return Err(at(format!("episode {index} has more than {MOST_STEPS} steps, the most that are executed")));
         }
         plan.waypoints.push(waypoint);
     }

@@ -176,7 +176,7 @@ fn a_spawn_area_out_of_reach_is_named_and_the_old_plans_stay() {
         run.words("plan").into_iter().chain(further).collect::<Vec<_>>()
     };
     run.refuses(plan(&["scene.spawn_x_m=[1.2, 1.4]"]), &["no room", "0.295 to 0.68 m", "scene.spawn_x_m"]);
-    let wall = "scene.obstacles=[{center_m=[0.45, 0.0, 0.1], size_m=[2.0, 2.0, 0.2]}]";
+    let wall = "scene.obstacles=[{center_m=[0.47, 0.0, 0.02], size_m=[0.4, 0.4, 0.04]}]";
     run.refuses(plan(&[wall]), &["no room", "scene.spawn_x_m"]);
 }
 

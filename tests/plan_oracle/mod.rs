@@ -63,7 +63,7 @@ impl Oracle {
         let tool = tool_of(&poses);
         let near = |[x, y, z]: [f64; 3]| {
             let at = tool.translation.vector;
-            f64::hypot(at.x - x, at.y - y) < ZONE_M[0] && at.z - z < ZONE_M[1]
+            hilt::math::hypot(at.x - x, at.y - y) < ZONE_M[0] && at.z - z < ZONE_M[1]
         };
         let releasing = near(plan.scene.target_m());
         for spec in LINK_SHAPES.iter().filter(|s| s.link > 0) {

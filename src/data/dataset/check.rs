@@ -2,7 +2,8 @@
 
 use super::features::{Feature, features};
 use super::meta::{CODEBASE_VERSION, INFO};
-use crate::data::{ContentHash, Provenance, json_file, provenance, read_bytes, seal};
+use crate::data::bytes::Format;
+use crate::data::{ContentHash, Provenance, json_file, provenance, seal};
 use crate::error::{Error, Result};
 use crate::state::CONTROL_HZ;
 use crate::tasks::Task;
@@ -10,6 +11,14 @@ use serde::Deserialize;
 use serde_json::Value;
 use std::collections::BTreeMap;
 use std::path::Path;
+
+/// The JSON files of a dataset from outside.
+pub(super) const DESCRIPTION: Format = Format {
+    most_bytes: 64 << 20,
+    reason: "a description has some 30 kB, and a line for each of its files",
+    head: |_, _| Ok(()),
+    ends: |_, _| Ok(()),
+};
 
 /// `meta/info.json`, as far as hilt reads it.
 pub(super) struct Info {
@@ -37,7 +46,7 @@ pub(super) fn info(root: &Path) -> Result<Info> {
     if !path.is_file() {
         return Err(Error::input(root, no_dataset(root)));
     }
-    let bytes = read_bytes(&path)?;
+    let bytes = DESCRIPTION.read(&path)?;
     let invalid = |e: serde_json::Error| Error::input(&path, format!("cannot be read: {e}"));
     let mut value: Value = serde_json::from_slice(&bytes).map_err(invalid)?;
     let version = value.get("codebase_version").and_then(Value::as_str).unwrap_or("none");

@@ -1,12 +1,13 @@
 //! Reading a dataset back into demos, with every doubt said in words.
 
+use super::check::DESCRIPTION;
 use super::check::{self, Info};
 use super::features::{
     ACTION, DONE, ENVIRONMENT, EPISODE, EXECUTED, FRAME, INDEX, Kind, NEXT_ENVIRONMENT, NEXT_STATE, REWARD, SOURCE, STATE,
     SUCCESS, features,
 };
-use super::meta::INFO;
-use crate::data::{ContentHash, Provenance, parquet_file, read_bytes};
+use super::meta::{INFO, is_file};
+use crate::data::{ContentHash, Provenance, parquet_file};
 use crate::demo::Demo;
 use crate::error::{Error, Result};
 use crate::tasks::Task;
@@ -49,11 +50,17 @@ pub fn read(root: &Path) -> Result<Dataset> {
     let mut rewritten = None;
     let mut files = BTreeMap::from([(INFO.to_string(), info.hash)]);
     for name in info.files.keys() {
+        if !is_file(Path::new(name)) {
+            return Err(Error::input(
+                &root.join(INFO),
+                format!("lists \"{name}\", which is no file of a dataset; run hilt convert again"),
+            ));
+        }
         let path = root.join(name);
         if !path.is_file() {
             return Err(Error::input(&path, "is missing; the dataset is incomplete, run hilt convert again"));
         }
-        let bytes = read_bytes(&path)?;
+        let bytes = if name.ends_with(".parquet") { parquet_file::FORMAT.read(&path)? } else { DESCRIPTION.read(&path)? };
         let hash = ContentHash::of(&bytes);
         let untouched = info.files.get(name).is_some_and(|h| *h == hash.to_string());
         files.insert(name.clone(), hash);
@@ -64,14 +71,25 @@ pub fn read(root: &Path) -> Result<Dataset> {
             rewritten = Some(path.clone());
         }
         if name.starts_with("data/") {
-            columns.append(&path, info.task, bytes)?;
+            columns.append(&path, info.task, bytes).map_err(|why| also_rewritten(why, rewritten.as_deref()))?;
         }
     }
-    let dataset = columns.into_dataset(root, info, files)?;
-    // What another program rewrote may break the rules above, which says more than this.
-    match rewritten {
-        Some(path) => Err(Error::input(&path, "was rewritten by another program; run hilt convert again")),
-        None => Ok(dataset),
+    // What another program rewrote may break the rules as well, which says more.
+    match (columns.into_dataset(root, info, files), rewritten) {
+        (Err(why), rewritten) => Err(also_rewritten(why, rewritten.as_deref())),
+        (Ok(_), Some(path)) => Err(Error::input(&path, "was rewritten by another program; run hilt convert again")),
+        (Ok(dataset), None) => Ok(dataset),
+    }
+}
+
+/// An error of a dataset, of which another program rewrote a file.
+fn also_rewritten(error: Error, rewritten: Option<&Path>) -> Error {
+    match (error, rewritten) {
+        (Error::Input { path, message }, Some(file)) => {
+            let file = file.file_name().unwrap_or_default().display();
+            Error::Input { path, message: format!("{message}; {file} was rewritten by another program, run hilt convert again") }
+        }
+        (other, _) => other,
     }
 }
 
@@ -164,7 +182,13 @@ impl Columns {
     fn episodes(&self, root: &Path, info: &Info) -> Result<Vec<std::ops::Range<usize>>> {
         let done = self.flags.get(DONE).map_or(&[][..], Vec::as_slice);
         let ends: Vec<usize> = done.iter().enumerate().filter(|(_, d)| **d).map(|(t, _)| t + 1).collect();
-        if done.len() != info.frames || ends.len() != info.episodes || ends.last() != Some(&done.len()) {
+        if done.len() == info.frames && ends.len() == info.episodes && ends.last() != Some(&done.len()) {
+            return Err(Error::input(
+                root,
+                format!("its last frame ends no episode ({DONE} is false there): the rows are not in their order"),
+            ));
+        }
+        if done.len() != info.frames || ends.len() != info.episodes || done.is_empty() {
             let message = format!(
                 "meta/info.json says {} episodes of {} frames, the data has {} of {}",
                 info.episodes,

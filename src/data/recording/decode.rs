@@ -1,12 +1,13 @@
 //! From the messages of `proto/hilt.proto` back to an episode. Every error says which message and field.
 
+use super::walk::Outline;
 use super::{OUTCOME_TOPIC, SCENE_TOPIC, STEP_TOPIC};
+use crate::config::check_scene;
 use crate::data::proto;
 use crate::demo::{Contacts, Episode, Phase, Step};
 use crate::scene::{Obstacle, Scene};
 use crate::state::{Context, Pose, State};
 use crate::tasks::{FailureClass, Task};
-use super::walk::Outline;
 use prost::Message;
 
 /// The episode in a whole file.
@@ -45,14 +46,16 @@ fn scene(message: proto::Scene) -> Result<Scene, String> {
     let obstacle = |o: &proto::Obstacle| {
         Ok(Obstacle { center_m: fixed("obstacle.center_m", &o.center_m)?, size_m: fixed("obstacle.size_m", &o.size_m)? })
     };
-    Ok(Scene {
+    let scene = Scene {
         task: message.task.parse()?,
         block: pose("scene.block", message.block.as_ref())?,
         context: context(message.context.as_ref())?,
         obstacles: message.obstacles.iter().map(obstacle).collect::<Result<_, String>>()?,
         friction: message.friction,
         block_mass_kg: message.block_mass_kg,
-    })
+    };
+    check_scene(&scene).map_err(|why| format!("its scene cannot be: {why}"))?;
+    Ok(scene)
 }
 
 fn step(message: proto::Step, t: usize, task: Task) -> Result<Step, String> {

@@ -10,7 +10,8 @@ impl<'a> Fields<'a> {
     /// # Errors
     /// Says that they are not there.
     pub(super) fn take(&mut self, len: usize) -> Result<&'a [u8], String> {
-        let (taken, rest) = self.0.split_at_checked(len).ok_or_else(|| format!("a record wants {len} bytes, {} are left", self.0.len()))?;
+        let (taken, rest) =
+            self.0.split_at_checked(len).ok_or_else(|| format!("a record wants {len} bytes, {} are left", self.0.len()))?;
         self.0 = rest;
         Ok(taken)
     }

@@ -21,23 +21,24 @@ mod walk;
 
 pub use foxglove::{BASE_FRAME, BLOCK_FRAME, WORLD_FRAME};
 
-use super::{ContentHash, Provenance, atomic, proto, provenance, seal};
-use crate::guard::guarded;
 use super::bytes::{Ends, Format};
+use super::{ContentHash, Provenance, atomic, proto, provenance, seal};
 use crate::demo::Episode;
 use crate::error::{Error, Result};
+use crate::interrupt;
+use crate::guard::guarded;
 use crate::robot::Arm;
 use crate::state::CONTROL_HZ;
 use ::foxglove::Encode;
 use ::foxglove::messages::{FrameTransforms, JointStates, SceneUpdate};
+use fields::Fields;
 use mcap::records::{MessageHeader, Metadata};
 use mcap::{Attachment, McapResult, WriteOptions, Writer};
 use prost::Message;
+use records::{Sections, op};
 use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::io::Cursor;
-use fields::Fields;
-use records::{Sections, op};
 use std::path::{Path, PathBuf};
 use walk::Outline;
 
@@ -75,6 +76,7 @@ pub fn is_file(path: &Path) -> bool {
 /// # Errors
 /// [`Error::Io`] when it cannot be read.
 pub fn files(dir: &Path) -> Result<Vec<PathBuf>> {
+    let _waits = interrupt::waiting();
     let entries = std::fs::read_dir(dir).map_err(|e| Error::io(dir, "read", e))?;
     let names = entries.map(|entry| entry.map(|e| e.file_name())).collect::<std::io::Result<Vec<_>>>();
     let names = names.map_err(|e| Error::io(dir, "read", e))?;
@@ -145,7 +147,9 @@ fn check_ends(path: &Path, ends: &Ends) -> Result<()> {
         Ok(library) if library.starts_with(LIBRARY) => Ok(()),
         Ok(other) => Err(Error::input(
             path,
-            format!("is an MCAP file that another program wrote or rewrote (\"{other}\"); hilt reads its own: run hilt simulate again"),
+            format!(
+                "is an MCAP file that another program wrote or rewrote (\"{other}\"); hilt reads its own: run hilt simulate again"
+            ),
         )),
         Err(why) => Err(Error::input(path, format!("is an MCAP file without a header ({why}); run hilt simulate again"))),
     }

@@ -124,7 +124,10 @@ impl Sections {
     pub(super) fn check_crcs(&self, bytes: &[u8]) -> Result<(), String> {
         // The summary's own checksum covers the footer up to itself.
         let summary_crc = bytes.len() - mcap::MAGIC.len() - CRC_BYTES;
-        let sums = [("data section", 0..self.data_end, self.data_crc()), ("summary", self.summary..summary_crc, summary_crc..summary_crc + CRC_BYTES)];
+        let sums = [
+            ("data section", 0..self.data_end, self.data_crc()),
+            ("summary", self.summary..summary_crc, summary_crc..summary_crc + CRC_BYTES),
+        ];
         for (name, covered, at) in sums {
             let noted = Fields(&bytes[at]).u32()?;
             if noted != 0 && noted != crc32fast::hash(&bytes[covered]) {

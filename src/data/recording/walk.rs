@@ -133,9 +133,10 @@ impl Unpacker {
         let mut fields = Fields(content);
         let (_start, _end, size, crc) = (fields.u64()?, fields.u64()?, fields.u64()?, fields.u32()?);
         let (packing, packed) = (fields.text()?, fields.bytes64()?);
-        let size = usize::try_from(size).ok().filter(|size| *size <= self.left).ok_or_else(|| {
-            format!("it would unpack to {size} bytes, a recording has at most {MOST_UNPACKED_BYTES}")
-        })?;
+        let size = usize::try_from(size)
+            .ok()
+            .filter(|size| *size <= self.left)
+            .ok_or_else(|| format!("it would unpack to {size} bytes, a recording has at most {MOST_UNPACKED_BYTES}"))?;
         self.left -= size;
         let unpacked = match packing {
             NONE => packed,
@@ -158,7 +159,7 @@ impl Unpacker {
     }
 }
 
-fn metadata_entries(mut fields: Fields) -> Result<(&str, BTreeMap<&str, &str>), String> {
+fn metadata_entries<'a>(mut fields: Fields<'a>) -> Result<(&'a str, BTreeMap<&'a str, &'a str>), String> {
     let (name, mut entries) = (fields.text()?, Fields(fields.bytes32()?));
     let mut found = BTreeMap::new();
     while !entries.0.is_empty() {
@@ -169,7 +170,8 @@ fn metadata_entries(mut fields: Fields) -> Result<(&str, BTreeMap<&str, &str>), 
 
 fn check_attachment(content: &[u8]) -> Result<(), String> {
     let mut fields = Fields(content);
-    let (_logged, _created, name, _media, _data) = (fields.u64()?, fields.u64()?, fields.text()?, fields.text()?, fields.bytes64()?);
+    let (_logged, _created, name, _media, _data) =
+        (fields.u64()?, fields.u64()?, fields.text()?, fields.text()?, fields.bytes64()?);
     let covered = &content[..content.len() - fields.0.len()];
     let crc = fields.u32()?;
     if crc != 0 && crc != crc32fast::hash(covered) {

@@ -46,11 +46,6 @@ mod tests {
         0x0c80_0000,
     ];
 
-    fn edge(rng: &mut impl Rng) -> f32 {
-        let bits = EDGES[rng.random_range(0..EDGES.len())].wrapping_add(rng.random_range(0..3)).wrapping_sub(1);
-        f32::from_bits(bits | if rng.random() { 1 << 31 } else { 0 })
-    }
-
     /// `v` with an exponent from `least` on, one of `count`.
     fn scaled(v: f32, least: u32, count: u32) -> f32 {
         f32::from_bits(v.to_bits() & 0x807f_ffff | (least + (v.to_bits() >> 7) % count) << 23)

@@ -1,0 +1,142 @@
+//! What a Parquet file says of its own size, checked before a decoder believes it: 20 kB can hold 20 GB.
+
+use super::budget::Budget;
+use super::thrift::{Value, walk};
+
+/// Bytes at the end of a file: the metadata's length and the format's name.
+const TAIL: usize = 8;
+/// Entries of a schema, groups included; hilt's widest has some 200, and decoders descend into groups by recursion.
+const MOST_SCHEMA_ENTRIES: usize = 1000;
+/// Numbers of a row in one column; hilt's longest list has 32.
+const MOST_VALUES_OF_A_ROW: i64 = 1000;
+/// Unpacked bytes of a page; hilt's own have a megabyte.
+const MOST_PAGE_BYTES: i64 = 64 << 20;
+/// What a decoder takes for each value: a number and its place.
+const BYTES_OF_A_VALUE: u64 = 8;
+
+/// Fields of the file's metadata and of a page's header.
+mod field {
+    pub(super) const SCHEMA: &[i16] = &[2];
+    pub(super) const ROW_GROUP: &[i16] = &[4];
+    pub(super) const COLUMN: &[i16] = &[4, 1];
+    pub(super) const ROWS_OF_GROUP: &[i16] = &[4, 3];
+    pub(super) const PHYSICAL_TYPE: &[i16] = &[4, 1, 3, 1];
+    pub(super) const VALUES: &[i16] = &[4, 1, 3, 5];
+    pub(super) const PACKED: &[i16] = &[4, 1, 3, 7];
+    pub(super) const DATA_PAGE: &[i16] = &[4, 1, 3, 9];
+    pub(super) const DICTIONARY_PAGE: &[i16] = &[4, 1, 3, 11];
+
+    pub(super) const PAGE_UNPACKED: &[i16] = &[2];
+    pub(super) const PAGE_PACKED: &[i16] = &[3];
+    pub(super) const PAGE_VALUES: [&[i16]; 3] = [&[5, 1], &[7, 1], &[8, 1]];
+}
+
+/// Parquet's number of the type of texts.
+const BYTE_ARRAY: i64 = 6;
+
+/// A column of a row group, as the metadata has it.
+#[derive(Clone, Copy, Debug, Default)]
+struct Chunk {
+    group: usize,
+    physical_type: i64,
+    values: i64,
+    packed: i64,
+    data_page: i64,
+    dictionary_page: Option<i64>,
+}
+
+/// Checks metadata and page headers of a whole file; returns the unpacked bytes of the largest page of texts: one value can be as long.
+///
+/// # Errors
+/// Says what does not fit, or is too large.
+pub(super) fn check(bytes: &[u8]) -> Result<usize, String> {
+    let end = bytes.len().checked_sub(TAIL).ok_or("it is shorter than its metadata")?;
+    let length = bytes[end..].first_chunk().map_or(0, |length| u32::from_le_bytes(*length)) as usize;
+    let start = end.checked_sub(length).ok_or_else(|| format!("its metadata would have {length} bytes, the file has {end}"))?;
+    let (chunks, rows) = columns(&bytes[start..end])?;
+    let mut budget = Budget::new();
+    budget.allow_for(bytes.len());
+    let mut longest_text = 0;
+    for chunk in &chunks {
+        let most = rows.get(chunk.group).copied().unwrap_or(0).saturating_mul(MOST_VALUES_OF_A_ROW);
+        if !(0..=most).contains(&chunk.values) {
+            return Err(format!("a column has {} values, its rows can have at most {most}", chunk.values));
+        }
+        budget.take(chunk.values.unsigned_abs().saturating_mul(BYTES_OF_A_VALUE))?;
+        let largest = pages(&bytes[..start], chunk, &mut budget)?;
+        if chunk.physical_type == BYTE_ARRAY {
+            longest_text = longest_text.max(largest);
+        }
+    }
+    Ok(longest_text)
+}
+
+/// The columns of all row groups, and the rows of each group.
+fn columns(metadata: &[u8]) -> Result<(Vec<Chunk>, Vec<i64>), String> {
+    let (mut chunks, mut rows) = (Vec::<Chunk>::new(), Vec::<i64>::new());
+    walk(metadata, &mut |path, value| {
+        match (path, value) {
+            (field::SCHEMA, Value::List(count)) if count > MOST_SCHEMA_ENTRIES => {
+                return Err(format!("its schema has {count} entries, hilt reads at most {MOST_SCHEMA_ENTRIES}"));
+            }
+            (field::ROW_GROUP, Value::Struct) => rows.push(0),
+            (field::COLUMN, Value::Struct) => chunks.push(Chunk { group: rows.len().saturating_sub(1), ..Chunk::default() }),
+            (field::ROWS_OF_GROUP, Value::Int(count)) => rows.iter_mut().last().into_iter().for_each(|last| *last = count),
+            (_, Value::Int(number)) => {
+                if let Some(chunk) = chunks.last_mut() {
+                    chunk.take(path, number);
+                }
+            }
+            _ => {}
+        }
+        Ok(())
+    })?;
+    Ok((chunks, rows))
+}
+
+impl Chunk {
+    fn take(&mut self, path: &[i16], number: i64) {
+        match path {
+            field::PHYSICAL_TYPE => self.physical_type = number,
+            field::VALUES => self.values = number,
+            field::PACKED => self.packed = number,
+            field::DATA_PAGE => self.data_page = number,
+            field::DICTIONARY_PAGE => self.dictionary_page = Some(number),
+            _ => {}
+        }
+    }
+}
+
+/// Walks the pages of a column; returns the unpacked bytes of the largest.
+fn pages(bytes: &[u8], chunk: &Chunk, budget: &mut Budget) -> Result<usize, String> {
+    let start = chunk.dictionary_page.filter(|at| *at > 0).map_or(chunk.data_page, |at| at.min(chunk.data_page));
+    let outside = || format!("a column lies at byte {start} and has {} bytes, the data has {}", chunk.packed, bytes.len());
+    let from = usize::try_from(start).map_err(|_| outside())?;
+    let to = usize::try_from(chunk.packed).ok().and_then(|packed| from.checked_add(packed));
+    let mut left = to.and_then(|to| bytes.get(from..to)).ok_or_else(outside)?;
+    let mut largest = 0;
+    while !left.is_empty() {
+        let (mut unpacked, mut packed, mut values) = (0, 0, 0);
+        let header = walk(left, &mut |path, value| {
+            match (path, value) {
+                (field::PAGE_UNPACKED, Value::Int(number)) => unpacked = number,
+                (field::PAGE_PACKED, Value::Int(number)) => packed = number,
+                (path, Value::Int(number)) if field::PAGE_VALUES.contains(&path) => values = number,
+                _ => {}
+            }
+            Ok(())
+        })?;
+        if !(0..=MOST_PAGE_BYTES).contains(&unpacked) || !(0..=chunk.values.max(unpacked)).contains(&values) {
+            return Err(format!(
+                "a page would unpack to {unpacked} bytes and {values} values, more than its column has or hilt reads"
+            ));
+        }
+        budget.take(unpacked.unsigned_abs())?;
+        let next = usize::try_from(packed).ok().and_then(|packed| header.checked_add(packed));
+        left = next
+            .and_then(|next| left.get(next..))
+            .ok_or_else(|| format!("a page has {packed} bytes, {} are left", left.len() - header))?;
+        largest = largest.max(unpacked as usize);
+    }
+    Ok(largest)
+}
