@@ -24,13 +24,3 @@ pub mod weights;
 
 pub use inspect::{inspect, inspect_text};
 pub use provenance::{ContentHash, Provenance};
-
-use crate::error::{Error, Result};
-use crate::interrupt;
-use std::path::Path;
-
-/// All bytes of a file.
-fn read_bytes(path: &Path) -> Result<Vec<u8>> {
-    let _waits = interrupt::waiting();
-    std::fs::read(path).map_err(|e| Error::io(path, "read", e))
-}

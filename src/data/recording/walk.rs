@@ -24,6 +24,8 @@ pub(super) struct Outline<'a> {
     messages: u64,
 }
 
+/// What a message is shown to, with its topic.
+type See<'a> = dyn FnMut(&str, &[u8]) -> Result<(), String> + 'a;
 /// Place and length of the records of a kind.
 type Places = BTreeMap<u8, Vec<(u64, u64)>>;
 
@@ -64,7 +66,7 @@ impl<'a> Outline<'a> {
     ///
     /// # Errors
     /// What `see` returns; says which chunk or message is broken.
-    pub(super) fn messages(&self, see: &mut dyn FnMut(&str, &[u8]) -> Result<(), String>) -> Result<(), String> {
+    pub(super) fn messages(&self, see: &mut See) -> Result<(), String> {
         let mut messages = Messages { topics: BTreeMap::new(), count: 0, see };
         let mut unpacker = Unpacker::new()?;
         for record in Records::new(self.data, self.from) {
@@ -90,7 +92,7 @@ impl<'a> Outline<'a> {
 struct Messages<'a> {
     topics: BTreeMap<u16, String>,
     count: u64,
-    see: &'a mut dyn FnMut(&str, &[u8]) -> Result<(), String>,
+    see: &'a mut See<'a>,
 }
 
 impl Messages<'_> {
