@@ -8,6 +8,8 @@ mod readers;
 mod recordings;
 #[path = "../benches/fuzz/sources.rs"]
 mod sources;
+#[path = "../benches/fuzz/structure.rs"]
+mod structure;
 
 use readers::{NAMES, Reader, Verdict};
 

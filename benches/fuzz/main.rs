@@ -6,6 +6,7 @@ mod mutate;
 mod readers;
 mod recordings;
 mod sources;
+mod structure;
 
 use readers::{NAMES, Reader, Verdict};
 use std::fs::{self, File};

@@ -1,7 +1,7 @@
 //! The readers, and the inputs that each gets.
 
 use super::mutate::{self, one_in, pick};
-use super::{recordings, sources};
+use super::{recordings, sources, structure};
 use hilt::config::{Pipeline, Source};
 use hilt::data::{ContentHash, dataset, inspect, json_file, recording, seal, table_file, weights};
 use hilt::error::{Error, Result};
@@ -9,7 +9,7 @@ use hilt::interrupt::Interrupt;
 use hilt::learn::{Checkpoint, Dynamics, Policy};
 use hilt::plan::from_table;
 use hilt::seed::stream;
-use hilt::table::{Table, Values};
+use hilt::table::Table;
 use hilt::tensor::NamedTensor;
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
@@ -23,8 +23,6 @@ use std::path::{Path, PathBuf};
 pub const NAMES: [&str; 8] = ["recording", "plans", "dataset", "policy", "dynamics", "checkpoint", "summary", "settings"];
 /// One input in so many is left without a right seal.
 const UNSEALED: u32 = 16;
-/// Bytes of the length before the header of weights.
-const LENGTH: usize = 8;
 /// Words for `--set`.
 const SETS: [&str; 6] = [
     "plan.speed=0.5",
@@ -105,7 +103,10 @@ impl Reader {
                 let content = json!({ "success_rate": 0.5, "wilson_95": [0.1, 0.9], "failures": { "dropped": 1 } });
                 self.whole = json_file::encode(Path::new("summary"), &content, &made).expect("a summary");
             }
-            _ => self.whole = Pipeline::defaults(hilt::tasks::Task::Stack).to_toml(None).expect("TOML").into_bytes(),
+            _ => {
+                self.whole = Pipeline::defaults(hilt::tasks::Task::Stack).to_toml(None).expect("TOML").into_bytes();
+                self.other = self.whole.clone();
+            }
         }
         if let Some((tensors, meta)) = &self.network {
             self.whole = sources::weights(self.name, tensors, meta).expect("weights");
@@ -137,14 +138,15 @@ impl Reader {
         let whole = self.part(number).map_or(&self.whole, |part| &self.parts[part]);
         let plain = |rng: &mut ChaCha8Rng| mutate::bytes(whole.clone(), &self.other, rng);
         let by_structure = match self.name {
+            "settings" if number % 2 == 1 => Some(mutate::text(pick::<&str>(&SETS, rng), rng).into_bytes()),
             _ if one_in(3, rng) => None,
             "recording" if one_in(2, rng) => recordings::with_other_messages(whole, rng),
             "recording" => recordings::with_another_chunk(whole, rng),
-            "plans" => self.other_table(rng),
+            "plans" => structure::other_table(&self.table, rng),
             "policy" | "dynamics" | "checkpoint" => self.other_weights(rng),
-            "summary" => other_json(whole, rng),
-            "dataset" if whole.starts_with(b"{") => other_json(whole, rng),
-            "settings" if number % 2 == 1 => Some(mutate::text(pick::<&str>(&SETS, rng), rng).into_bytes()),
+            "summary" => structure::other_json(whole, rng),
+            "dataset" if whole.starts_with(b"{") => structure::other_json(whole, rng),
+            "settings" => structure::other_toml(whole, rng),
             _ => None,
         };
         let bytes = by_structure.unwrap_or_else(|| plain(rng));
@@ -153,34 +155,6 @@ impl Reader {
             "recording" => recordings::reseal(bytes),
             _ => seal::reseal(bytes.clone()).unwrap_or(bytes),
         }
-    }
-
-    fn other_table(&self, rng: &mut ChaCha8Rng) -> Option<Vec<u8>> {
-        let mut table = self.table.clone();
-        for _ in 0..rng.random_range(1..4) {
-            let at = mutate::below(table.columns.len(), rng);
-            let row = mutate::below(table.rows().max(1), rng);
-            match &mut table.columns[at].values {
-                Values::F32(v) => v[row] = mutate::number(rng) as f32,
-                Values::F64(v) => v[row] = mutate::number(rng),
-                Values::I64(v) => v[row] = *pick(&[-1, 0, 1, i64::MAX, i64::MIN, 1 << 40], rng),
-                Values::Bool(v) => v[row] ^= true,
-                Values::Text(v) => {
-                    // A scene stands on an episode's first row only.
-                    let text = v.iter_mut().find(|text| text.starts_with('{'));
-                    if let Some(Ok(mut scene)) = text.as_ref().map(|text| serde_json::from_str::<Value>(text)) {
-                        mutate::value(&mut scene, rng);
-                        text.into_iter().for_each(|text| *text = scene.to_string());
-                    } else {
-                        v[row] = mutate::text(&v[row].clone(), rng);
-                    }
-                }
-            }
-        }
-        if one_in(8, rng) {
-            table.columns.remove(mutate::below(table.columns.len(), rng));
-        }
-        sources::table(&table)
     }
 
     fn other_weights(&self, rng: &mut ChaCha8Rng) -> Option<Vec<u8>> {
@@ -194,11 +168,11 @@ impl Reader {
                 let number = mutate::number(rng) as f32;
                 tensors[hit].data.iter_mut().for_each(|v| *v = number);
                 if !number.is_finite() {
-                    return Some(with_bytes(&self.whole, number));
+                    return Some(structure::with_bytes(&self.whole, number));
                 }
             }
             6 => tensors[hit].name = mutate::text(&tensors[hit].name.clone(), rng),
-            _ => return other_header(&self.whole, rng),
+            _ => return structure::other_header(&self.whole, rng),
         }
         sources::weights(self.name, &tensors, &meta)
     }
@@ -264,35 +238,4 @@ impl Reader {
             _ => Pipeline::load(&Source::File(path.to_path_buf(), None), &[]).map(drop),
         }
     }
-}
-
-/// JSON with another value in some place.
-fn other_json(whole: &[u8], rng: &mut ChaCha8Rng) -> Option<Vec<u8>> {
-    let mut content: Value = serde_json::from_slice(whole).ok()?;
-    mutate::value(&mut content, rng);
-    serde_json::to_vec_pretty(&content).ok()
-}
-
-/// Weights whose last number is another.
-fn with_bytes(whole: &[u8], number: f32) -> Vec<u8> {
-    let mut bytes = whole.to_vec();
-    let at = bytes.len() - size_of::<f32>();
-    bytes[at..].copy_from_slice(&number.to_le_bytes());
-    bytes
-}
-
-/// Weights with another value in their header, or in the header of hilt within it.
-fn other_header(whole: &[u8], rng: &mut ChaCha8Rng) -> Option<Vec<u8>> {
-    let end = LENGTH + u64::from_le_bytes(whole[..LENGTH].try_into().ok()?) as usize;
-    let mut header: Value = serde_json::from_slice(&whole[LENGTH..end]).ok()?;
-    if one_in(2, rng) {
-        let inner = &mut header["__metadata__"]["hilt"];
-        let mut hilt: Value = serde_json::from_str(inner.as_str()?).ok()?;
-        mutate::value(&mut hilt, rng);
-        *inner = hilt.to_string().into();
-    } else {
-        mutate::value(&mut header, rng);
-    }
-    let header = header.to_string();
-    Some([&(header.len() as u64).to_le_bytes(), header.as_bytes(), &whole[end..]].concat())
 }

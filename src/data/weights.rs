@@ -23,8 +23,8 @@ const F32_BYTES: usize = size_of::<f32>();
 const LENGTH_BYTES: usize = size_of::<u64>();
 /// A longer header is refused: that of a checkpoint after 75,000 epochs, a line of metrics each, has so much.
 const MOST_HEADER_BYTES: u64 = 64 << 20;
-/// How the header of every file of hilt begins.
-const HEADER_START: &[u8] = b"{\"__metadata__\":{\"hilt\":";
+/// The metadata come first in the header; this key is theirs.
+const METADATA_KEY: &[u8] = b"\"hilt\"";
 
 /// What weights look like from outside.
 const FORMAT: Format = Format {
@@ -39,9 +39,8 @@ fn check_head(path: &Path, head: &[u8]) -> Result<()> {
     if !header.starts_with(b"{") {
         return Err(Error::input(path, "is no safetensors file; expected weights of hilt pretrain or hilt train"));
     }
-    if !header.starts_with(HEADER_START) {
-        let why = "was not written by hilt, or rewritten by another program: its header has no \"hilt\" key at its beginning";
-        return Err(Error::input(path, why));
+    if !header.windows(METADATA_KEY.len()).any(|part| part == METADATA_KEY) {
+        return Err(Error::input(path, "was not written by hilt: its header has no \"hilt\" key"));
     }
     Ok(())
 }
