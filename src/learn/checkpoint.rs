@@ -85,7 +85,7 @@ impl Checkpoint {
         let reader = Reader { tensors: &self.tensors, meta: &self.meta };
         let counts: Counts = reader.meta("counts")?;
         let mut history = History { rows: reader.meta("epochs")?, selection: reader.meta("selection")?, best: None };
-        past::check(&counts, &history, &learner.settings)?;
+        past::check(&counts, &history)?;
         learner.restore(&reader, &counts)?;
         if history.selection.best().is_some() {
             let mut best = learner.policy.clone();

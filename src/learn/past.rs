@@ -2,21 +2,22 @@
 
 use super::checkpoint::{Counts, History};
 use super::metrics::{EpochMetrics, HIL, WARM_START};
-use crate::config::TrainSettings;
 
 /// Most updates of a run: `train.warm_start_updates` and `train.min_updates` are allowed ten million each, epochs over the most demos
 /// ten thousand times as many.
 const MOST_UPDATES: u64 = 1_000_000_000_000;
 /// Most steps of an optimiser, which counts them in 32 bits.
 const MOST_STEPS: u32 = 1 << 31;
+/// Most episodes that candidates are rolled out on, as `train.select_episodes` is allowed.
+const MOST_EPISODES: u64 = 100_000;
 /// The logarithm of a ratio of two positive numbers of double precision is no longer.
 const LARGEST_LOG: f64 = 1500.0;
 
-/// Refuses counts, epochs and candidates that no run of these settings leaves behind.
+/// Refuses counts, epochs and candidates that no run leaves behind.
 ///
 /// # Errors
 /// Says which number is out of its limits.
-pub(super) fn check(counts: &Counts, history: &History, settings: &TrainSettings) -> Result<(), String> {
+pub(super) fn check(counts: &Counts, history: &History) -> Result<(), String> {
     let Some(last) = history.rows.last() else { return Err("it holds no epoch".into()) };
     let before = [None].into_iter().chain(history.rows.iter().map(Some));
     before.zip(&history.rows).try_for_each(|(before, row)| follows(before, row))?;
@@ -37,7 +38,7 @@ pub(super) fn check(counts: &Counts, history: &History, settings: &TrainSettings
     let (d_conv, log_ratio) = counts.averages.known();
     within("average of d_conv", d_conv, 0.0, 1.0)?;
     within("average of the gradients' ratio", log_ratio, -LARGEST_LOG, LARGEST_LOG)?;
-    candidates(history, settings)
+    candidates(history)
 }
 
 /// Epochs come one after another, the warm start's before those of Algorithm 1.
@@ -57,8 +58,8 @@ fn follows(before: Option<&EpochMetrics>, row: &EpochMetrics) -> Result<(), Stri
     at_most("epochs of a stage", row.epochs, MOST_UPDATES)
 }
 
-/// The chosen candidate is one of them, and none solved more episodes than there were.
-fn candidates(history: &History, settings: &TrainSettings) -> Result<(), String> {
+/// The chosen candidate is one of them, and none solved more episodes than there can be.
+fn candidates(history: &History) -> Result<(), String> {
     let (chosen, candidates) = (history.selection.chosen, &history.selection.candidates);
     if chosen >= candidates.len().max(1) {
         return Err(format!("it chose candidate {chosen} of {}", candidates.len()));
@@ -66,7 +67,7 @@ fn candidates(history: &History, settings: &TrainSettings) -> Result<(), String>
     if candidates.len() > history.rows.len() {
         return Err(format!("it has {} candidates after {} epochs", candidates.len(), history.rows.len()));
     }
-    candidates.iter().try_for_each(|c| at_most("successes of a candidate", c.successes, settings.select_episodes))
+    candidates.iter().try_for_each(|c| at_most("successes of a candidate", c.successes, MOST_EPISODES))
 }
 
 fn at_most<T: PartialOrd + std::fmt::Display>(what: &str, value: T, most: T) -> Result<(), String> {
