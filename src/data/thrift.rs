@@ -6,6 +6,9 @@ const MOST_DEPTH: usize = 12;
 /// Field numbers from the outside in: a column's size is \[4, 1, 3, 7\] of a file. Elements of a list have the path of the list.
 type Path = Vec<i16>;
 
+/// What is shown the fields, by their paths.
+type See<'a> = dyn FnMut(&[i16], Value) -> Result<(), String> + 'a;
+
 /// What stands at a path.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Value {
@@ -21,7 +24,7 @@ pub(super) enum Value {
 ///
 /// # Errors
 /// Says where a length does not fit, and what `see` says.
-pub(super) fn walk(bytes: &[u8], see: &mut dyn FnMut(&[i16], Value) -> Result<(), String>) -> Result<usize, String> {
+pub(super) fn walk(bytes: &[u8], see: &mut See) -> Result<usize, String> {
     let mut walker = Walker { bytes, at: 0, path: Path::new(), see };
     walker.fields()?;
     Ok(walker.at)
@@ -31,7 +34,7 @@ struct Walker<'a> {
     bytes: &'a [u8],
     at: usize,
     path: Path,
-    see: &'a mut dyn FnMut(&[i16], Value) -> Result<(), String>,
+    see: &'a mut See<'a>,
 }
 
 impl Walker<'_> {

@@ -56,7 +56,7 @@ pub fn from_table(table: &Table) -> Result<Vec<Plan>, String> {
             let values: [f64; JOINTS] = std::array::from_fn(|j| columns[j][row]);
             match values.iter().position(|v| v.is_nan() || v.abs() > LARGEST_NUMBER) {
                 Some(j) if values[j].is_finite() => {
-                    Err(at(format!("{} is {}, no angle or velocity of an arm", JOINT_NAMES[j], values[j])))
+                    Err(at(format!("{} is {:e}, no angle or velocity of an arm", JOINT_NAMES[j], values[j])))
                 }
                 Some(j) => Err(at(format!("{} is {}, not a finite number", JOINT_NAMES[j], values[j]))),
                 None => Ok(values),
