@@ -2,36 +2,73 @@
 
 use super::walk::Outline;
 use super::{OUTCOME_TOPIC, SCENE_TOPIC, STEP_TOPIC};
-use crate::config::check_scene;
+use crate::config::{self, check_scene};
 use crate::data::proto;
 use crate::demo::{Contacts, Episode, Phase, Step};
 use crate::scene::{Obstacle, Scene};
 use crate::state::{Context, Pose, State};
 use crate::tasks::{FailureClass, Task};
 use prost::Message;
+use std::mem::discriminant;
+
+/// Most control steps of a recording: twice the longest demonstration that settings allow, which is the horizon of its policy.
+const MOST_STEPS: usize = 2 * config::MOST_STEPS as usize;
+/// Most bytes of a message that is read; a step has some 700, a scene 60 for every obstacle.
+const MOST_MESSAGE_BYTES: usize = 64 << 10;
+
+/// The messages seen so far.
+#[derive(Default)]
+struct Seen {
+    scene: Option<Scene>,
+    outcome: Option<proto::Outcome>,
+    steps: Vec<Step>,
+    /// Whether the last step is the final state.
+    ended: bool,
+}
 
 /// The episode in a whole file.
 pub(super) fn episode(outline: &Outline) -> Result<Episode, String> {
-    let (mut found_scene, mut found_outcome, mut steps) = (None, None, Vec::new());
-    outline.messages(&mut |topic, data| {
-        match topic {
-            SCENE_TOPIC => found_scene = Some(scene(parse(SCENE_TOPIC, data)?)?),
-            STEP_TOPIC => steps.push(parse::<proto::Step>(STEP_TOPIC, data)?),
-            OUTCOME_TOPIC => found_outcome = Some(parse::<proto::Outcome>(OUTCOME_TOPIC, data)?),
-            _ => {}
-        }
-        Ok(())
-    })?;
-    let scene = found_scene.ok_or_else(|| missing(SCENE_TOPIC))?;
-    let outcome = found_outcome.ok_or_else(|| missing(OUTCOME_TOPIC))?;
-    let count = steps.len() as u64;
-    if !steps.last().is_some_and(|s| s.final_state) || outcome.steps + 1 != count {
-        return Err(format!("{OUTCOME_TOPIC} says {} steps and a final state, {STEP_TOPIC} has {count} messages", outcome.steps));
+    let mut seen = Seen::default();
+    outline.messages(&mut |topic, data| seen.take(topic, data))?;
+    let scene = seen.scene.ok_or_else(|| missing(SCENE_TOPIC))?;
+    let outcome = seen.outcome.ok_or_else(|| missing(OUTCOME_TOPIC))?;
+    let mut steps = seen.steps;
+    if !seen.ended || outcome.steps.checked_add(1) != Some(steps.len() as u64) {
+        let found = steps.len();
+        return Err(format!("{OUTCOME_TOPIC} says {} steps and a final state, {STEP_TOPIC} has {found} messages", outcome.steps));
     }
-    let mut steps = steps.into_iter().enumerate().map(|(t, s)| step(s, t, scene.task)).collect::<Result<Vec<_>, _>>()?;
     let last = steps.pop().ok_or_else(|| missing(STEP_TOPIC))?;
     let failure = failure(&outcome.failure)?;
     Ok(Episode { index: outcome.episode, scene, steps, last, success: outcome.success, failure })
+}
+
+impl Seen {
+    fn take(&mut self, topic: &str, data: &[u8]) -> Result<(), String> {
+        if ![SCENE_TOPIC, STEP_TOPIC, OUTCOME_TOPIC].contains(&topic) {
+            return Ok(());
+        }
+        if data.len() > MOST_MESSAGE_BYTES {
+            return Err(format!("a message on {topic} has {} bytes, at most {MOST_MESSAGE_BYTES} are read", data.len()));
+        }
+        match topic {
+            SCENE_TOPIC => self.scene = Some(scene(parse(topic, data)?)?),
+            OUTCOME_TOPIC => self.outcome = Some(parse(topic, data)?),
+            _ => {
+                let scene = self.scene.as_ref().ok_or_else(|| missing(SCENE_TOPIC))?;
+                let (message, t) = (parse::<proto::Step>(topic, data)?, self.steps.len());
+                if t > MOST_STEPS {
+                    return Err(format!("has more than {MOST_STEPS} steps, the most of an episode"));
+                }
+                self.ended = message.final_state;
+                let step = step(message, t, scene.task)?;
+                if discriminant(&step.state.context) != discriminant(&scene.context) {
+                    return Err(format!("step {t} has the goal or base block of another task than {}", scene.task));
+                }
+                self.steps.push(step);
+            }
+        }
+        Ok(())
+    }
 }
 
 fn missing(topic: &str) -> String {
