@@ -1,8 +1,10 @@
 use super::places::Places;
-use super::{Context, Outcome, output};
-use crate::data;
-use crate::error::Result;
-use std::path::PathBuf;
+use super::{Context, Outcome, output, pretrain, train};
+use crate::data::{self, weights};
+use crate::error::{Error, Result};
+use crate::learn::{Dynamics, Policy};
+use serde_json::Value;
+use std::path::{Path, PathBuf};
 
 /// Say what a file or directory of hilt is: provenance, shapes, counts, statistics.
 #[derive(Debug, clap::Args)]
@@ -18,10 +20,23 @@ pub struct Args {
 pub fn run(args: &Args, context: &Context) -> Result<Outcome> {
     Places::new().read(&args.path).check(&context.console)?;
     let found = data::inspect(&args.path, &context.interrupt)?;
+    check_network(&args.path, &found["network"])?;
     if args.json {
         output::print_json(&found)?;
     } else {
         output::print(&data::inspect_text(&found))?;
     }
     Ok(Outcome::Done)
+}
+
+/// Whether weights are those of a network, as the stages that run it ask.
+fn check_network(path: &Path, kind: &Value) -> Result<()> {
+    let Some(kind) = kind.as_str().filter(|kind| [train::KIND, pretrain::KIND].contains(kind)) else { return Ok(()) };
+    let (tensors, meta, _) = weights::read(path, kind)?;
+    let made = if kind == train::KIND {
+        Policy::from_tensors(&tensors, &meta).map(drop)
+    } else {
+        Dynamics::from_tensors(&tensors, &meta).map(drop)
+    };
+    made.map_err(|why| Error::input(path, why))
 }
