@@ -233,3 +233,16 @@ fn what_a_killed_run_left_behind_does_not_stand_in_the_way() {
         assert!(after[&name] == bytes, "{} is another", name.display());
     }
 }
+
+#[test]
+fn weights_that_no_stage_can_run_are_refused_by_inspect_too() {
+    let run = Run::finished();
+    let (tensors, whole, origin) = hilt::data::weights::read(&run.at("policy.safetensors"), "policy").expect("weights");
+    for (key, value) in [("hidden", serde_json::json!([0])), ("horizon_steps", serde_json::json!(u32::MAX))] {
+        let mut meta = whole.clone();
+        meta[key] = value;
+        hilt::data::weights::write(&run.at("policy.safetensors"), "policy", &tensors, &meta, &origin).expect("written");
+        run.refuses(run.words("evaluate"), &["policy.safetensors", key]);
+        run.refuses(vec!["inspect".into(), run.name("policy.safetensors")], &["policy.safetensors", key]);
+    }
+}
