@@ -27,7 +27,7 @@ const TAIL: f64 = 3.654_152_885_361_009;
 
 /// A number from N(0, 1), the same on every processor.
 ///
-/// `rand_distr` takes logarithms of the system for one number in 3,700, those beyond [`TAIL`], and their last digit depends on the
+/// `rand_distr` takes logarithms of the system for one number in 3,700, those beyond 3.65, and their last digit depends on the
 /// processor. These are computed again from the same draws: the last two, of which the first is the place in the tail.
 pub fn normal(rng: &mut impl Rng) -> f64 {
     let mut remembering = Remembering { rng, last: [0; 2] };

@@ -15,7 +15,7 @@ use std::path::{Path, PathBuf};
 /// at its top are kept. The working directory and mount points cannot be exchanged: they are filled where they are, if they are empty.
 ///
 /// # Errors
-/// As [`check_directory`]; what `fill` returns; [`Error::Io`] when the system refuses.
+/// As [`super::check_directory`]; what `fill` returns; [`Error::Io`] when the system refuses.
 pub fn write_dir(path: &Path, ours: impl Fn(&Path) -> bool, fill: impl FnOnce(&Path) -> Result<()>) -> Result<()> {
     let place = check_directory(path, ours)?;
     let parent = if place.in_place { place.path.as_path() } else { parent_of(&place.path)? };
