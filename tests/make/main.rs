@@ -47,7 +47,7 @@ pub fn copy(from: &Path, to: &Path) {
 /// What make needs, with the binary under test as the one that it has built.
 pub fn tree() -> TempDir {
     let (root, dir) = (Path::new(env!("CARGO_MANIFEST_DIR")), tempfile::tempdir().expect("temporary directory"));
-    for name in ["Makefile", "tools", "pipelines"] {
+    for name in ["Makefile", "pipelines"] {
         copy(&root.join(name), &dir.path().join(name));
     }
     let release = dir.path().join("target/release");
