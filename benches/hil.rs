@@ -1,6 +1,6 @@
 //! Time of one update: Algorithm 1 on 1, 16 and 32 demos of 150 steps (behavior cloning, state cloning, dynamics fine-tuning; D = 32, 9
 //! actions, 3 x 100 tanh, rho .45), and behavior cloning alone on 512 pairs, on one and on two threads; beside it, the share of the
-//! processor's f32 peak, measured here by a loop of fused multiplications and additions. Only the matrix products of the two networks
+//! processor's f32 peak, measured here by loops of fused multiplications and additions in its widest registers. Only the matrix products of the two networks
 //! count as operations: not tanh, features, losses or Adam, nor idle lanes, nor the first steps that behavior cloning has already done.
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
@@ -9,6 +9,7 @@ use hilt::demo::Demo;
 use hilt::interrupt::Interrupt;
 use hilt::learn::{Learner, pretrain_dynamics};
 use hilt::math::sin_cos;
+use hilt::nn::kernel;
 use hilt::robot::READY_Q_RAD;
 use hilt::state::{CONTROL_DT_S, JOINTS};
 use hilt::tasks::Task;
@@ -58,42 +59,66 @@ fn hil_update(learner: &mut Learner, demos: &[usize], rows: &[usize]) {
     learner.fine_tune(rows).expect("finite");
 }
 
-/// Registers of the loop below: enough that no multiplication waits for the one before it.
+/// Registers of the loops below: enough that no multiplication waits for the one before it.
 const CHAINS: usize = 12;
-const PEAK_ROUNDS: usize = 2_000_000;
+const PEAK_ROUNDS: usize = 1_000_000;
 
-/// Most f32 operations per second of one core: fused multiplications and additions in registers, eight at once where the processor can.
-fn peak_flops() -> f64 {
-    let once = || {
+/// Most f32 operations per second of one core: fused multiplications and additions in registers of each width that it has \[floats\].
+fn peak_flops() -> Vec<(usize, f64)> {
+    let once = |width: usize, multiply_add: &dyn Fn(f32) -> f32| {
         let start = Instant::now();
-        std::hint::black_box(multiply_add(std::hint::black_box(0.5), PEAK_ROUNDS));
-        (PEAK_ROUNDS * CHAINS * 8 * 2) as f64 / start.elapsed().as_secs_f64()
+        std::hint::black_box(multiply_add(std::hint::black_box(0.5)));
+        (PEAK_ROUNDS * CHAINS * width * 2) as f64 / start.elapsed().as_secs_f64()
     };
-    (0..20).map(|_| once()).fold(0.0, f64::max)
+    let best = |width, multiply_add: &dyn Fn(f32) -> f32| (width, (0..20).map(|_| once(width, multiply_add)).fold(0.0, f64::max));
+    let mut peaks = Vec::new();
+    #[cfg(target_arch = "x86_64")]
+    {
+        if std::arch::is_x86_feature_detected!("avx2") && std::arch::is_x86_feature_detected!("fma") {
+            // SAFETY: the processor has AVX2 and FMA.
+            peaks.push(best(8, &|factor| unsafe { multiply_add_256(factor) }));
+        }
+        if std::arch::is_x86_feature_detected!("avx512f") {
+            // SAFETY: the processor has AVX-512F.
+            peaks.push(best(16, &|factor| unsafe { multiply_add_512(factor) }));
+        }
+    }
+    if peaks.is_empty() {
+        peaks.push(best(8, &multiply_add));
+    }
+    peaks
 }
 
-fn multiply_add(factor: f32, rounds: usize) -> f32 {
-    #[cfg(target_arch = "x86_64")]
-    if std::arch::is_x86_feature_detected!("avx2") && std::arch::is_x86_feature_detected!("fma") {
-        // SAFETY: the processor has AVX2 and FMA.
-        return unsafe { multiply_add_fused(factor, rounds) };
-    }
+fn multiply_add(factor: f32) -> f32 {
     let mut sums = [[0.0f32; 8]; CHAINS];
-    (0..rounds).for_each(|_| sums.as_flattened_mut().iter_mut().for_each(|sum| *sum = *sum * factor + 1.0));
+    (0..PEAK_ROUNDS).for_each(|_| sums.as_flattened_mut().iter_mut().for_each(|sum| *sum = *sum * factor + 1.0));
     sums.as_flattened().iter().sum()
 }
 
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx2,fma")]
-fn multiply_add_fused(factor: f32, rounds: usize) -> f32 {
+fn multiply_add_256(factor: f32) -> f32 {
     use std::arch::x86_64::{_mm256_cvtss_f32, _mm256_fmadd_ps, _mm256_set1_ps};
     let (mut sums, factor, one) = ([_mm256_set1_ps(0.0); CHAINS], _mm256_set1_ps(factor), _mm256_set1_ps(1.0));
-    for _ in 0..rounds {
+    for _ in 0..PEAK_ROUNDS {
         for sum in &mut sums {
             *sum = _mm256_fmadd_ps(*sum, factor, one);
         }
     }
     sums.iter().map(|sum| _mm256_cvtss_f32(*sum)).sum()
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx512f")]
+fn multiply_add_512(factor: f32) -> f32 {
+    use std::arch::x86_64::{_mm512_cvtss_f32, _mm512_fmadd_ps, _mm512_set1_ps};
+    let (mut sums, factor, one) = ([_mm512_set1_ps(0.0); CHAINS], _mm512_set1_ps(factor), _mm512_set1_ps(1.0));
+    for _ in 0..PEAK_ROUNDS {
+        for sum in &mut sums {
+            *sum = _mm512_fmadd_ps(*sum, factor, one);
+        }
+    }
+    sums.iter().map(|sum| _mm512_cvtss_f32(*sum)).sum()
 }
 
 /// Repetitions whose fastest is compared with the peak: other programs only ever slow it down.
@@ -102,7 +127,8 @@ const REPETITIONS: usize = 60;
 /// What a repetition is compared with.
 #[derive(Default)]
 struct Yardstick {
-    /// Most operations per second of one core seen so far: a slow minute must not flatter what is measured in it.
+    /// Most operations per second of one core seen so far, in the fastest of its registers: a slow minute must not flatter what is
+    /// measured in it.
     peak: f64,
     /// Operations per second of each work on the first number of threads.
     rates: HashMap<String, f64>,
@@ -112,7 +138,7 @@ impl Yardstick {
     /// Prints how close to `threads` cores' peak the fastest repetition of `work` comes, which returns its operations, and how much
     /// faster it is than on the first number of threads.
     fn report(&mut self, name: &str, threads: usize, mut work: impl FnMut() -> u64) {
-        self.peak = self.peak.max(peak_flops());
+        self.peak = peak_flops().into_iter().map(|(_, rate)| rate).fold(self.peak, f64::max);
         let once = |_| {
             let start = Instant::now();
             let flops = work();
@@ -135,6 +161,11 @@ impl Yardstick {
 
 fn updates(criterion: &mut Criterion) {
     let mut yardstick = Yardstick::default();
+    kernel::choose().expect("HILT_KERNEL names a kernel of this processor");
+    println!("kernel: {}", kernel::describe());
+    for (width, peak) in peak_flops() {
+        println!("peak of one core in registers of {} bits: {:.1} GFLOP/s", 32 * width, peak / 1e9);
+    }
     for threads in [1, 2] {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads start");
         let mut learner = learner();

@@ -1,8 +1,10 @@
 //! The command line: parse, dispatch, turn an outcome into an exit code. The only place that ends the process.
 
 use clap::Parser;
+use clap::error::ErrorKind;
 use hilt::cmd::{Cli, Outcome};
 use hilt::interrupt::{Interrupt, anyone_waits};
+use hilt::nn::kernel;
 use signal_hook::consts::{SIGINT, SIGTERM, SIGXFSZ};
 use signal_hook::flag;
 use signal_hook::iterator::Signals;
@@ -29,10 +31,18 @@ const PATIENCE: Duration = Duration::from_millis(500);
 const TICK: Duration = Duration::from_millis(20);
 
 fn main() -> ExitCode {
-    let cli = Cli::parse();
-    if let Err(e) = hilt::nn::kernel::choose() {
+    if let Err(e) = kernel::choose() {
         return fail(&e.to_string(), e.exit_code(None));
     }
+    let cli = match Cli::try_parse() {
+        Ok(cli) => cli,
+        Err(e) if e.kind() == ErrorKind::DisplayVersion => {
+            // Who closed stdout does not want to know.
+            let _ = writeln!(std::io::stdout(), "{e}kernel: {}", kernel::describe());
+            return ExitCode::SUCCESS;
+        }
+        Err(e) => e.exit(),
+    };
     let interrupt = Interrupt::default();
     if let Err(e) = listen(interrupt.clone()) {
         return fail(&format!("cannot listen for signals: {e}"), 1);

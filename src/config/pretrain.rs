@@ -33,8 +33,13 @@ pub struct PretrainSettings {
     pub reexecute: u64,
     /// Disturbance pulses of those executions.
     pub reexecute_pulses: PulseSettings,
-    /// Epochs E over the demos.
+    /// Epochs E over the demos; the learning rate falls along all of them, but they may end before, as `patience` says.
     pub epochs: u64,
+    /// Epochs after which a network is done when they have not brought its loss on the validation demos `min_gain` below the lowest that
+    /// came before them; 0 = all epochs.
+    pub patience: u64,
+    /// That gain, as a share of the loss.
+    pub min_gain: f64,
     /// Transitions per update, shuffled across demos; 0 = one whole demo per update, as Algorithm 4 has it.
     pub batch_rows: usize,
     /// Adam's learning rate at the first update (paper: 1e-3).
@@ -61,6 +66,8 @@ impl Default for PretrainSettings {
             reexecute: 0,
             reexecute_pulses: PulseSettings { probability: 0.01, ..PulseSettings::default() },
             epochs: 200,
+            patience: 10,
+            min_gain: 0.02,
             batch_rows: 512,
             learning_rate: 1e-3,
             final_learning_rate: 1e-5,

@@ -90,6 +90,8 @@ pub(super) const RANGES: &[Range] = &[
     within("pretrain.reexecute_pulses.steps", 1.0, STEPS),
     within("pretrain.reexecute_pulses.sigma_rad_s", 0.0, 10.0),
     within("pretrain.epochs", 1.0, MOST_EPOCHS),
+    within("pretrain.patience", 0.0, MOST_EPOCHS),
+    below("pretrain.min_gain", 0.0, 1.0),
     within("pretrain.batch_rows", 0.0, MOST_ROWS),
     above("pretrain.learning_rate", 0.0, SINGLE),
     above("pretrain.final_learning_rate", 0.0, SINGLE),

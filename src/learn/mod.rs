@@ -18,6 +18,7 @@ mod metrics;
 mod model_report;
 mod multi_step;
 mod past;
+mod patience;
 mod policy;
 pub mod pretrain_dynamics;
 mod pushes;

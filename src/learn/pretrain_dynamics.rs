@@ -6,6 +6,7 @@ use super::limits::{affordable, before_the_first_update};
 use super::metrics::{EpochMetrics, Mean, table};
 use super::model_report::{ModelReport, error_table};
 use super::multi_step::{MultiStep, horizons};
+use super::patience::Patience;
 use super::regression::{Loss, Regression};
 use crate::config::{ModelLoss, PretrainSettings};
 use crate::demo::Demo;
@@ -48,7 +49,7 @@ pub fn pretrain_dynamics(
         }
         let mut adam = Adam::new(dynamics.net.params().len());
         let mut ema = Ema::new(dynamics.net.params(), settings.ema_decay);
-        let (mut averaged, mut updates) = (dynamics.clone(), 0);
+        let (mut averaged, mut updates, mut patience) = (dynamics.clone(), 0, Patience::new(settings));
         for epoch in member * settings.epochs..(member + 1) * settings.epochs {
             let mut mean = Mean::default();
             let mut metrics = EpochMetrics::new("pretrain", epoch + 1, settings.epochs * settings.ensemble as u64);
@@ -70,7 +71,11 @@ pub fn pretrain_dynamics(
             metrics.validation_l_model = validation_loss(&averaged, &held_out, &held_out_samples, &mut work);
             check_validation(&metrics)?;
             log(&metrics);
+            let flat = patience.ends_after(metrics.validation_l_model);
             epochs.push(metrics);
+            if flat {
+                break;
+            }
         }
         dynamics = averaged;
     }

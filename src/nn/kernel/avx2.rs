@@ -3,33 +3,13 @@
 use super::super::lanes::{LANES, Lanes};
 use super::Product;
 use super::tiles::Tile;
-use super::vector::{Isa, Vector};
+use super::vector::{Arithmetic, Isa, Vector};
 use std::arch::x86_64::*;
 
-impl Vector for __m256 {
-    #[inline(always)]
-    unsafe fn load(from: *const Lanes) -> Self {
-        // SAFETY: the caller's; Lanes are aligned to 32 bytes.
-        unsafe { _mm256_load_ps(from.cast()) }
-    }
-    #[inline(always)]
-    unsafe fn load_row(from: *const f32) -> Self {
-        // SAFETY: the caller's.
-        unsafe { _mm256_loadu_ps(from) }
-    }
-    #[inline(always)]
-    unsafe fn store(self, to: *mut Lanes) {
-        // SAFETY: as `load`.
-        unsafe { _mm256_store_ps(to.cast(), self) }
-    }
-    #[inline(always)]
-    unsafe fn store_row(self, to: *mut f32) {
-        // SAFETY: the caller's.
-        unsafe { _mm256_storeu_ps(to, self) }
-    }
+impl Arithmetic for __m256 {
     #[inline(always)]
     unsafe fn splat(value: f32) -> Self {
-        // SAFETY: the processor has AVX2, here and below.
+        // SAFETY: the processor has AVX2; so below.
         unsafe { _mm256_set1_ps(value) }
     }
     #[inline(always)]
@@ -67,6 +47,29 @@ impl Vector for __m256 {
         // SAFETY: as above.
         unsafe { _mm256_and_ps(self, _mm256_cmp_ps::<_CMP_GT_OQ>(y, _mm256_setzero_ps())) }
     }
+}
+
+impl Vector for __m256 {
+    #[inline(always)]
+    unsafe fn load(from: *const Lanes) -> Self {
+        // SAFETY: the caller's; Lanes are aligned to 32 bytes.
+        unsafe { _mm256_load_ps(from.cast()) }
+    }
+    #[inline(always)]
+    unsafe fn load_row(from: *const f32) -> Self {
+        // SAFETY: the caller's.
+        unsafe { _mm256_loadu_ps(from) }
+    }
+    #[inline(always)]
+    unsafe fn store(self, to: *mut Lanes) {
+        // SAFETY: as `load`.
+        unsafe { _mm256_store_ps(to.cast(), self) }
+    }
+    #[inline(always)]
+    unsafe fn store_row(self, to: *mut f32) {
+        // SAFETY: the caller's.
+        unsafe { _mm256_storeu_ps(to, self) }
+    }
     #[inline(always)]
     unsafe fn transposed(v: [Self; LANES]) -> [Self; LANES] {
         // SAFETY: as above.
@@ -96,7 +99,6 @@ impl Vector for __m256 {
 pub struct Avx2;
 
 impl Isa for Avx2 {
-    type Vector = __m256;
     const TILE_PANELS: usize = 2;
     const TILE_ENTRIES: [usize; 5] = [0, 10, 6, 3, 0];
     #[inline(always)]
@@ -110,7 +112,7 @@ impl Isa for Avx2 {
 #[inline(never)]
 unsafe fn any_tiles<const S: usize>(panels: usize, entries: usize, count: usize, first: Tile) {
     // SAFETY: the caller's.
-    unsafe { super::tiles::any_tiles::<Avx2, S>(panels, entries, count, first) }
+    unsafe { super::tiles::any_tiles::<__m256, S>(panels, entries, count, first) }
 }
 
 /// # Safety

@@ -1,37 +1,135 @@
-//! Products compiled for AVX-512: vectors of eight floats as with AVX2, but 32 registers for them, so that a tile is twice as large and
-//! reads its operands half as often. The sums are the same to the bit. Vectors of sixteen would leave more lanes idle where few segments
-//! are under way.
+//! Products compiled for registers of sixteen floats: two neighbouring panels of eight are joined when they are read and parted when they
+//! are written, so that samples lie in memory as for every other path. The sums are the same to the bit. A panel that has no neighbour,
+//! and three of them, go as with AVX-512VL.
 
 use super::super::lanes::Lanes;
 use super::Product;
-use super::tiles::Tile;
-use super::vector::Isa;
-use std::arch::x86_64::__m256;
+use super::avx512vl;
+use super::tiles::{Tile, tiles};
+use super::vector::{Arithmetic, Isa, Panels};
+use std::arch::x86_64::*;
 
-/// AVX-512 with its instructions for shorter vectors: 24 of 32 registers hold sums.
-pub struct Avx512;
+/// The same entry of two neighbouring panels.
+#[derive(Clone, Copy)]
+struct Pair(__m512);
 
-impl Isa for Avx512 {
-    type Vector = __m256;
-    const TILE_PANELS: usize = 4;
-    const TILE_ENTRIES: [usize; 5] = [0, 10, 12, 8, 6];
+impl Arithmetic for Pair {
     #[inline(always)]
-    unsafe fn tiles<const S: usize>(panels: usize, entries: usize, count: usize, first: Tile) {
-        // SAFETY: the caller's.
-        unsafe { any_tiles::<S>(panels, entries, count, first) }
+    unsafe fn splat(value: f32) -> Self {
+        // SAFETY: the processor has AVX-512F, here and below.
+        Pair(unsafe { _mm512_set1_ps(value) })
+    }
+    #[inline(always)]
+    unsafe fn add(self, other: Self) -> Self {
+        // SAFETY: as above.
+        Pair(unsafe { _mm512_add_ps(self.0, other.0) })
+    }
+    #[inline(always)]
+    unsafe fn times(self, factor: Self) -> Self {
+        // SAFETY: as above.
+        Pair(unsafe { _mm512_mul_ps(self.0, factor.0) })
+    }
+    #[inline(always)]
+    unsafe fn over(self, divisor: Self) -> Self {
+        // SAFETY: as above.
+        Pair(unsafe { _mm512_div_ps(self.0, divisor.0) })
+    }
+    #[inline(always)]
+    unsafe fn times_plus(self, factor: Self, summand: Self) -> Self {
+        // SAFETY: as above.
+        Pair(unsafe { _mm512_fmadd_ps(self.0, factor.0, summand.0) })
+    }
+    #[inline(always)]
+    unsafe fn within(self, limit: f32) -> Self {
+        // SAFETY: as above. Both instructions return their second operand when one is NaN.
+        Pair(unsafe { _mm512_max_ps(_mm512_set1_ps(-limit), _mm512_min_ps(_mm512_set1_ps(limit), self.0)) })
+    }
+    #[inline(always)]
+    unsafe fn positive(self) -> Self {
+        // SAFETY: as above.
+        Pair(unsafe { _mm512_max_ps(_mm512_setzero_ps(), self.0) })
+    }
+    #[inline(always)]
+    unsafe fn where_positive(self, y: Self) -> Self {
+        // SAFETY: as above.
+        Pair(unsafe { _mm512_maskz_mov_ps(_mm512_cmp_ps_mask::<_CMP_GT_OQ>(y.0, _mm512_setzero_ps()), self.0) })
     }
 }
 
-#[target_feature(enable = "avx2,fma,avx512f,avx512vl")]
+impl Panels for Pair {
+    const COUNT: usize = 2;
+    #[inline(always)]
+    unsafe fn load(from: *const Lanes, between: usize) -> Self {
+        // SAFETY: the caller's; Lanes are aligned to 32 bytes, and the processor has AVX-512DQ.
+        unsafe {
+            let first = _mm512_castps256_ps512(_mm256_load_ps(from.cast()));
+            Pair(_mm512_insertf32x8::<1>(first, _mm256_load_ps(from.add(between).cast())))
+        }
+    }
+    #[inline(always)]
+    unsafe fn store(self, to: *mut Lanes, between: usize) {
+        // SAFETY: as `load`.
+        unsafe {
+            _mm256_store_ps(to.cast(), _mm512_castps512_ps256(self.0));
+            _mm256_store_ps(to.add(between).cast(), _mm512_extractf32x8_ps::<1>(self.0));
+        }
+    }
+    #[inline(always)]
+    unsafe fn prefetch(soon: *const Lanes) {
+        // SAFETY: SSE belongs to x86-64, and a prefetch reads nothing.
+        unsafe { _mm_prefetch::<_MM_HINT_T0>(soon.cast()) }
+    }
+}
+
+/// AVX-512: 24 of 32 registers hold sums.
+struct Avx512;
+
+impl Isa for Avx512 {
+    const TILE_PANELS: usize = 4;
+    const TILE_ENTRIES: [usize; 5] = [0, 10, 12, 8, 12];
+    #[inline(always)]
+    unsafe fn tiles<const S: usize>(panels: usize, entries: usize, count: usize, first: Tile) {
+        // SAFETY: the caller's.
+        unsafe {
+            match panels {
+                2 => of_pairs::<S, 1>(entries, count, first),
+                4 => of_pairs::<S, 2>(entries, count, first),
+                _ => avx512vl::any_tiles::<S>(panels, entries, count, first),
+            }
+        }
+    }
+}
+
+/// The tiles of P pairs compiled for this size.
+///
+/// # Safety
+/// As [`super::tiles::any_tiles`].
+#[target_feature(enable = "avx2,fma,avx512f,avx512vl,avx512dq")]
 #[inline(never)]
-unsafe fn any_tiles<const S: usize>(panels: usize, entries: usize, count: usize, first: Tile) {
+unsafe fn of_pairs<const S: usize, const P: usize>(entries: usize, count: usize, first: Tile) {
     // SAFETY: the caller's.
-    unsafe { super::tiles::any_large_tiles::<Avx512, S>(panels, entries, count, first) }
+    unsafe {
+        match entries {
+            1 => tiles::<Pair, S, P, 1>(count, first),
+            2 => tiles::<Pair, S, P, 2>(count, first),
+            3 => tiles::<Pair, S, P, 3>(count, first),
+            4 => tiles::<Pair, S, P, 4>(count, first),
+            5 => tiles::<Pair, S, P, 5>(count, first),
+            6 => tiles::<Pair, S, P, 6>(count, first),
+            7 => tiles::<Pair, S, P, 7>(count, first),
+            8 => tiles::<Pair, S, P, 8>(count, first),
+            9 => tiles::<Pair, S, P, 9>(count, first),
+            10 => tiles::<Pair, S, P, 10>(count, first),
+            11 => tiles::<Pair, S, P, 11>(count, first),
+            12 => tiles::<Pair, S, P, 12>(count, first),
+            _ => unreachable!("no tile spans {entries} entries"),
+        }
+    }
 }
 
 /// # Safety
 /// As [`super::tiles::product`].
-#[target_feature(enable = "avx2,fma,avx512f,avx512vl")]
+#[target_feature(enable = "avx2,fma,avx512f,avx512vl,avx512dq")]
 pub unsafe fn product(result: &mut [Lanes], width: usize, of: &Product) {
     // SAFETY: the caller's.
     unsafe { super::tiles::product::<Avx512>(result, width, of) }

@@ -1,7 +1,7 @@
 //! tanh, and samples turned into lanes.
 
 use super::super::lanes::{LANES, Lanes};
-use super::vector::Vector;
+use super::vector::{Arithmetic, Vector};
 
 /// Where [`NUMERATOR`] and [`DENOMINATOR`] end: tanh is 1 there but for 2e-7.
 const SATURATED: f32 = 8.0;
@@ -14,7 +14,7 @@ const DENOMINATOR: [f32; 5] = [1.0, 0.467_778_44, 2.616_452_6e-2, 3.411_326_6e-4
 /// # Safety
 /// The processor has T's instructions; so below.
 #[inline(always)]
-pub unsafe fn tanh<T: Vector>(x: T) -> T {
+pub unsafe fn tanh<T: Arithmetic>(x: T) -> T {
     // SAFETY: the caller's.
     unsafe {
         let x = x.within(SATURATED);
@@ -24,7 +24,7 @@ pub unsafe fn tanh<T: Vector>(x: T) -> T {
 }
 
 #[inline(always)]
-unsafe fn polynomial<T: Vector>(x: T, coefficients: [f32; 5]) -> T {
+unsafe fn polynomial<T: Arithmetic>(x: T, coefficients: [f32; 5]) -> T {
     // SAFETY: the caller's.
     unsafe {
         let mut sum = T::splat(coefficients[4]);
@@ -37,7 +37,7 @@ unsafe fn polynomial<T: Vector>(x: T, coefficients: [f32; 5]) -> T {
 
 /// d (1 - y^2).
 #[inline(always)]
-pub unsafe fn tanh_slope<T: Vector>(d: T, y: T) -> T {
+pub unsafe fn tanh_slope<T: Arithmetic>(d: T, y: T) -> T {
     // SAFETY: the caller's.
     unsafe { d.times(y).times(T::splat(-1.0)).times_plus(y, d) }
 }

@@ -1,22 +1,25 @@
 //! The arithmetic that a network spends its time in: one kernel for all matrix products, which ends with the activation, and what moves
-//! samples into lanes. Each is written once over a `vector` of eight floats and compiled for AVX-512, for AVX2 with FMA and for any
-//! processor; which one runs is found out at run time ([`choose`]). All give the same bits: where the processor has no fused multiply-add,
-//! `fused` does it in software, many times slower. All `unsafe` code of the library stands in this directory.
+//! samples into lanes. Each is written once over a `vector` and compiled for AVX-512 (with registers of sixteen and of eight floats), for
+//! AVX2 with FMA and for any processor; which one runs is found out at run time ([`choose`]). All give the same bits: where the processor
+//! has no fused multiply-add, `fused` does it in software, many times slower. All `unsafe` code of the library stands in this directory.
 
 #[cfg(target_arch = "x86_64")]
 mod avx2;
 #[cfg(target_arch = "x86_64")]
 mod avx512;
+#[cfg(target_arch = "x86_64")]
+mod avx512vl;
 mod entries;
 mod fused;
 mod path;
 mod tiles;
+mod trial;
 mod vector;
 
 use super::lanes::{LANES, Lanes};
 use path::Path;
 
-pub use path::choose;
+pub use path::{choose, describe};
 
 /// A product: result\[p\]\[f\] = finish(start + sum over k of a(k, f) x\[p\]\[k\]).
 #[derive(Clone, Copy)]
@@ -97,6 +100,8 @@ fn product_on(path: Path, result: &mut [Lanes], width: usize, of: Product) {
             #[cfg(target_arch = "x86_64")]
             Path::Avx512 => avx512::product(result, width, &of),
             #[cfg(target_arch = "x86_64")]
+            Path::Avx512Vl => avx512vl::product(result, width, &of),
+            #[cfg(target_arch = "x86_64")]
             Path::Avx2 => avx2::product(result, width, &of),
             Path::Portable => tiles::product::<vector::Portable>(result, width, &of),
         }
@@ -113,7 +118,7 @@ fn tanh_on(path: Path, y: &mut [Lanes]) {
     unsafe {
         match path {
             #[cfg(target_arch = "x86_64")]
-            Path::Avx512 | Path::Avx2 => avx2::tanh(y),
+            Path::Avx512 | Path::Avx512Vl | Path::Avx2 => avx2::tanh(y),
             Path::Portable => entries::tanh_all::<Lanes>(y),
         }
     }
@@ -139,7 +144,7 @@ fn transpose_on(path: Path, to: &mut [Lanes], from: &[Lanes], entries: usize) {
     unsafe {
         match path {
             #[cfg(target_arch = "x86_64")]
-            Path::Avx512 | Path::Avx2 => avx2::transpose(to, from, entries),
+            Path::Avx512 | Path::Avx512Vl | Path::Avx2 => avx2::transpose(to, from, entries),
             Path::Portable => entries::transpose::<Lanes>(to, from, entries),
         }
     }
@@ -159,7 +164,7 @@ fn interleave_on(path: Path, panel: &mut [Lanes], rows: [&[f32]; LANES]) {
     unsafe {
         match path {
             #[cfg(target_arch = "x86_64")]
-            Path::Avx512 | Path::Avx2 => avx2::interleave(panel, rows),
+            Path::Avx512 | Path::Avx512Vl | Path::Avx2 => avx2::interleave(panel, rows),
             Path::Portable => entries::interleave::<Lanes>(panel, rows),
         }
     }
@@ -179,7 +184,7 @@ fn separate_on(path: Path, rows: [&mut [f32]; LANES], panel: &[Lanes]) {
     unsafe {
         match path {
             #[cfg(target_arch = "x86_64")]
-            Path::Avx512 | Path::Avx2 => avx2::separate(rows, panel),
+            Path::Avx512 | Path::Avx512Vl | Path::Avx2 => avx2::separate(rows, panel),
             Path::Portable => entries::separate::<Lanes>(rows, panel),
         }
     }

@@ -6,7 +6,7 @@ use std::cmp::Ordering;
 
 /// Every path that this processor has.
 fn paths() -> Vec<Path> {
-    Path::available().map(|(_, path)| *path).collect()
+    Path::available().collect()
 }
 
 fn value(i: usize) -> f32 {

@@ -2,7 +2,7 @@
 
 use super::super::lanes::{LANES, Lanes};
 use super::entries::{tanh, tanh_slope};
-use super::vector::{Isa, Vector};
+use super::vector::{Isa, Panels, Vector};
 use super::{Coefficients, Finish, Product, Start};
 
 /// The addresses of one register tile.
@@ -136,37 +136,37 @@ impl Tile {
     }
 }
 
-/// `count` tiles of P panels and F entries side by side, a(k, f) and a(k, f + 1) being S floats apart.
+/// `count` tiles of P registers' panels and F entries side by side, a(k, f) and a(k, f + 1) being S floats apart.
 ///
 /// # Safety
-/// Every address lies within its array, and the processor has T's instructions.
+/// Every address lies within its array, and the processor has V's instructions.
 #[inline(always)]
-unsafe fn tiles<T: Isa, const S: usize, const P: usize, const F: usize>(count: usize, first: Tile) {
+pub unsafe fn tiles<V: Panels, const S: usize, const P: usize, const F: usize>(count: usize, first: Tile) {
     let mut tile = first;
     for _ in 0..count {
         // SAFETY: the caller's.
         unsafe {
             if let TileFinish::TanhSlope(y) | TileFinish::ReluSlope(y) = tile.finish {
-                let lines = (0..P).flat_map(|p| (0..F).step_by(2).map(move |f| p * tile.width + f));
-                lines.for_each(|at| T::Vector::prefetch(y.wrapping_add(at)));
+                let lines = (0..P * V::COUNT).flat_map(|p| (0..F).step_by(2).map(move |f| p * tile.width + f));
+                lines.for_each(|at| V::prefetch(y.wrapping_add(at)));
             }
-            let sums = sums::<T::Vector, S, P, F>(&tile);
-            finish::<T::Vector, P, F>(&tile, sums);
+            let sums = sums::<V, S, P, F>(&tile);
+            finish::<V, P, F>(&tile, sums);
         }
         tile = tile.next(F, S);
     }
 }
 
 #[inline(always)]
-unsafe fn sums<T: Vector, const S: usize, const P: usize, const F: usize>(tile: &Tile) -> [[T; P]; F] {
+unsafe fn sums<V: Panels, const S: usize, const P: usize, const F: usize>(tile: &Tile) -> [[V; P]; F] {
     // SAFETY: the caller's.
     unsafe {
-        let mut sums = [[T::splat(0.0); P]; F];
+        let mut sums = [[V::splat(0.0); P]; F];
         let (mut x, mut block) = (tile.x, tile.a);
         for _ in 0..tile.blocks {
             let mut a = block;
             for _ in 0..tile.inner {
-                step::<T, S, P, F>(&mut sums, a, x, tile.depth);
+                step::<V, S, P, F>(&mut sums, a, x, tile.depth);
                 (a, x) = (a.wrapping_add(tile.between_k), x.wrapping_add(1));
             }
             block = block.wrapping_add(tile.between_blocks);
@@ -177,17 +177,17 @@ unsafe fn sums<T: Vector, const S: usize, const P: usize, const F: usize>(tile: 
 
 /// Adds one k to the sums: its coefficients begin at `a`, its samples at `x`.
 #[inline(always)]
-unsafe fn step<T: Vector, const S: usize, const P: usize, const F: usize>(
-    sums: &mut [[T; P]; F],
+unsafe fn step<V: Panels, const S: usize, const P: usize, const F: usize>(
+    sums: &mut [[V; P]; F],
     a: *const f32,
     x: *const Lanes,
     depth: usize,
 ) {
     // SAFETY: the caller's.
     unsafe {
-        let samples: [T; P] = std::array::from_fn(|p| T::load(x.wrapping_add(p * depth)));
+        let samples: [V; P] = std::array::from_fn(|p| V::load(x.wrapping_add(p * V::COUNT * depth), depth));
         for (f, sums) in sums.iter_mut().enumerate() {
-            let a = T::splat(*a.add(f * S));
+            let a = V::splat(*a.add(f * S));
             for (sum, sample) in sums.iter_mut().zip(samples) {
                 *sum = sample.times_plus(a, *sum);
             }
@@ -215,22 +215,24 @@ macro_rules! each {
 
 /// What the sums begin with and what is made of them, asked once a tile: asked once a sum it takes a hundred cycles.
 #[inline(always)]
-unsafe fn finish<T: Vector, const P: usize, const F: usize>(tile: &Tile, mut sums: [[T; P]; F]) {
-    // SAFETY: the caller's; entry f of the tile's panel p lies p * width + f after its first.
+unsafe fn finish<V: Panels, const P: usize, const F: usize>(tile: &Tile, mut sums: [[V; P]; F]) {
+    let width = tile.width;
+    let place = |f: usize, p: usize| p * V::COUNT * width + f;
+    // SAFETY: the caller's; `place` is where entry f of register p's first panel lies after the tile's first.
     unsafe {
         match tile.start {
             TileStart::Zero => {}
-            TileStart::Result => each!(sums, |f, p, sum| *sum = sum.add(T::load(tile.result.add(p * tile.width + f)))),
-            TileStart::Bias(bias) => each!(sums, |f, _p, sum| *sum = sum.add(T::splat(*bias.add(f)))),
+            TileStart::Result => each!(sums, |f, p, sum| *sum = sum.add(V::load(tile.result.add(place(f, p)), width))),
+            TileStart::Bias(bias) => each!(sums, |f, _p, sum| *sum = sum.add(V::splat(*bias.add(f)))),
         }
         match tile.finish {
             TileFinish::Nothing => {}
             TileFinish::Tanh => each!(sums, |_f, _p, sum| *sum = tanh(*sum)),
             TileFinish::Relu => each!(sums, |_f, _p, sum| *sum = sum.positive()),
-            TileFinish::TanhSlope(y) => each!(sums, |f, p, sum| *sum = tanh_slope(*sum, T::load(y.add(p * tile.width + f)))),
-            TileFinish::ReluSlope(y) => each!(sums, |f, p, sum| *sum = sum.where_positive(T::load(y.add(p * tile.width + f)))),
+            TileFinish::TanhSlope(y) => each!(sums, |f, p, sum| *sum = tanh_slope(*sum, V::load(y.add(place(f, p)), width))),
+            TileFinish::ReluSlope(y) => each!(sums, |f, p, sum| *sum = sum.where_positive(V::load(y.add(place(f, p)), width))),
         }
-        each!(sums, |f, p, sum| sum.store(tile.result.add(p * tile.width + f)));
+        each!(sums, |f, p, sum| sum.store(tile.result.add(place(f, p)), width));
     }
 }
 
@@ -239,29 +241,29 @@ unsafe fn finish<T: Vector, const P: usize, const F: usize>(tile: &Tile, mut sum
 /// # Safety
 /// As [`tiles`].
 #[inline(always)]
-pub unsafe fn any_tiles<T: Isa, const S: usize>(panels: usize, entries: usize, count: usize, first: Tile) {
+pub unsafe fn any_tiles<V: Vector, const S: usize>(panels: usize, entries: usize, count: usize, first: Tile) {
     // SAFETY: the caller's.
     unsafe {
         match (panels, entries) {
-            (1, 1) => tiles::<T, S, 1, 1>(count, first),
-            (1, 2) => tiles::<T, S, 1, 2>(count, first),
-            (1, 3) => tiles::<T, S, 1, 3>(count, first),
-            (1, 4) => tiles::<T, S, 1, 4>(count, first),
-            (1, 5) => tiles::<T, S, 1, 5>(count, first),
-            (1, 6) => tiles::<T, S, 1, 6>(count, first),
-            (1, 7) => tiles::<T, S, 1, 7>(count, first),
-            (1, 8) => tiles::<T, S, 1, 8>(count, first),
-            (1, 9) => tiles::<T, S, 1, 9>(count, first),
-            (1, 10) => tiles::<T, S, 1, 10>(count, first),
-            (2, 1) => tiles::<T, S, 2, 1>(count, first),
-            (2, 2) => tiles::<T, S, 2, 2>(count, first),
-            (2, 3) => tiles::<T, S, 2, 3>(count, first),
-            (2, 4) => tiles::<T, S, 2, 4>(count, first),
-            (2, 5) => tiles::<T, S, 2, 5>(count, first),
-            (2, 6) => tiles::<T, S, 2, 6>(count, first),
-            (3, 1) => tiles::<T, S, 3, 1>(count, first),
-            (3, 2) => tiles::<T, S, 3, 2>(count, first),
-            (3, 3) => tiles::<T, S, 3, 3>(count, first),
+            (1, 1) => tiles::<V, S, 1, 1>(count, first),
+            (1, 2) => tiles::<V, S, 1, 2>(count, first),
+            (1, 3) => tiles::<V, S, 1, 3>(count, first),
+            (1, 4) => tiles::<V, S, 1, 4>(count, first),
+            (1, 5) => tiles::<V, S, 1, 5>(count, first),
+            (1, 6) => tiles::<V, S, 1, 6>(count, first),
+            (1, 7) => tiles::<V, S, 1, 7>(count, first),
+            (1, 8) => tiles::<V, S, 1, 8>(count, first),
+            (1, 9) => tiles::<V, S, 1, 9>(count, first),
+            (1, 10) => tiles::<V, S, 1, 10>(count, first),
+            (2, 1) => tiles::<V, S, 2, 1>(count, first),
+            (2, 2) => tiles::<V, S, 2, 2>(count, first),
+            (2, 3) => tiles::<V, S, 2, 3>(count, first),
+            (2, 4) => tiles::<V, S, 2, 4>(count, first),
+            (2, 5) => tiles::<V, S, 2, 5>(count, first),
+            (2, 6) => tiles::<V, S, 2, 6>(count, first),
+            (3, 1) => tiles::<V, S, 3, 1>(count, first),
+            (3, 2) => tiles::<V, S, 3, 2>(count, first),
+            (3, 3) => tiles::<V, S, 3, 3>(count, first),
             _ => unreachable!("no tile spans {panels} panels and {entries} entries"),
         }
     }
@@ -272,28 +274,28 @@ pub unsafe fn any_tiles<T: Isa, const S: usize>(panels: usize, entries: usize, c
 /// # Safety
 /// As [`tiles`].
 #[inline(always)]
-pub unsafe fn any_large_tiles<T: Isa, const S: usize>(panels: usize, entries: usize, count: usize, first: Tile) {
+pub unsafe fn any_large_tiles<V: Vector, const S: usize>(panels: usize, entries: usize, count: usize, first: Tile) {
     // SAFETY: the caller's.
     unsafe {
         match (panels, entries) {
-            (2, 7) => tiles::<T, S, 2, 7>(count, first),
-            (2, 8) => tiles::<T, S, 2, 8>(count, first),
-            (2, 9) => tiles::<T, S, 2, 9>(count, first),
-            (2, 10) => tiles::<T, S, 2, 10>(count, first),
-            (2, 11) => tiles::<T, S, 2, 11>(count, first),
-            (2, 12) => tiles::<T, S, 2, 12>(count, first),
-            (3, 4) => tiles::<T, S, 3, 4>(count, first),
-            (3, 5) => tiles::<T, S, 3, 5>(count, first),
-            (3, 6) => tiles::<T, S, 3, 6>(count, first),
-            (3, 7) => tiles::<T, S, 3, 7>(count, first),
-            (3, 8) => tiles::<T, S, 3, 8>(count, first),
-            (4, 1) => tiles::<T, S, 4, 1>(count, first),
-            (4, 2) => tiles::<T, S, 4, 2>(count, first),
-            (4, 3) => tiles::<T, S, 4, 3>(count, first),
-            (4, 4) => tiles::<T, S, 4, 4>(count, first),
-            (4, 5) => tiles::<T, S, 4, 5>(count, first),
-            (4, 6) => tiles::<T, S, 4, 6>(count, first),
-            _ => any_tiles::<T, S>(panels, entries, count, first),
+            (2, 7) => tiles::<V, S, 2, 7>(count, first),
+            (2, 8) => tiles::<V, S, 2, 8>(count, first),
+            (2, 9) => tiles::<V, S, 2, 9>(count, first),
+            (2, 10) => tiles::<V, S, 2, 10>(count, first),
+            (2, 11) => tiles::<V, S, 2, 11>(count, first),
+            (2, 12) => tiles::<V, S, 2, 12>(count, first),
+            (3, 4) => tiles::<V, S, 3, 4>(count, first),
+            (3, 5) => tiles::<V, S, 3, 5>(count, first),
+            (3, 6) => tiles::<V, S, 3, 6>(count, first),
+            (3, 7) => tiles::<V, S, 3, 7>(count, first),
+            (3, 8) => tiles::<V, S, 3, 8>(count, first),
+            (4, 1) => tiles::<V, S, 4, 1>(count, first),
+            (4, 2) => tiles::<V, S, 4, 2>(count, first),
+            (4, 3) => tiles::<V, S, 4, 3>(count, first),
+            (4, 4) => tiles::<V, S, 4, 4>(count, first),
+            (4, 5) => tiles::<V, S, 4, 5>(count, first),
+            (4, 6) => tiles::<V, S, 4, 6>(count, first),
+            _ => any_tiles::<V, S>(panels, entries, count, first),
         }
     }
 }

@@ -1,20 +1,14 @@
-//! Eight floats that instructions work on at once.
+//! Floats that instructions work on at once.
 
 use super::super::lanes::{LANES, Lanes};
 use super::fused;
 use super::tiles::Tile;
 
-/// A vector of eight floats.
+/// Floats that instructions work on at once, each by itself.
 ///
 /// # Safety
 /// Every function needs the processor to have the vector's instructions, and its addresses to be valid.
-pub trait Vector: Copy {
-    unsafe fn load(from: *const Lanes) -> Self;
-    /// Eight floats, not aligned.
-    unsafe fn load_row(from: *const f32) -> Self;
-    unsafe fn store(self, to: *mut Lanes);
-    /// Eight floats, not aligned.
-    unsafe fn store_row(self, to: *mut f32);
+pub trait Arithmetic: Copy {
     unsafe fn splat(value: f32) -> Self;
     /// self + other.
     unsafe fn add(self, other: Self) -> Self;
@@ -30,16 +24,60 @@ pub trait Vector: Copy {
     unsafe fn positive(self) -> Self;
     /// self where `y` is above 0, else 0.
     unsafe fn where_positive(self, y: Self) -> Self;
+}
+
+/// A vector of eight floats.
+///
+/// # Safety
+/// As [`Arithmetic`].
+pub trait Vector: Arithmetic {
+    unsafe fn load(from: *const Lanes) -> Self;
+    /// Eight floats, not aligned.
+    unsafe fn load_row(from: *const f32) -> Self;
+    unsafe fn store(self, to: *mut Lanes);
+    /// Eight floats, not aligned.
+    unsafe fn store_row(self, to: *mut f32);
     /// Element i of vector r becomes element r of vector i.
     unsafe fn transposed(square: [Self; LANES]) -> [Self; LANES];
     /// Asks the processor to bring this into its cache while it works on something else; without effect on any result.
     unsafe fn prefetch(soon: *const Lanes);
 }
 
-/// An instruction set: its vector, and the tiles that its registers hold.
+/// One entry of as many neighbouring panels as a register holds.
+///
+/// # Safety
+/// As [`Arithmetic`].
+pub trait Panels: Arithmetic {
+    /// How many panels.
+    const COUNT: usize;
+    /// The entry at `from` and its like in the panels after, `between` entries apart.
+    unsafe fn load(from: *const Lanes, between: usize) -> Self;
+    unsafe fn store(self, to: *mut Lanes, between: usize);
+    /// As [`Vector::prefetch`].
+    unsafe fn prefetch(soon: *const Lanes);
+}
+
+impl<V: Vector> Panels for V {
+    const COUNT: usize = 1;
+    #[inline(always)]
+    unsafe fn load(from: *const Lanes, _: usize) -> Self {
+        // SAFETY: the caller's, here and below.
+        unsafe { V::load(from) }
+    }
+    #[inline(always)]
+    unsafe fn store(self, to: *mut Lanes, _: usize) {
+        // SAFETY: as above.
+        unsafe { V::store(self, to) }
+    }
+    #[inline(always)]
+    unsafe fn prefetch(soon: *const Lanes) {
+        // SAFETY: as above.
+        unsafe { V::prefetch(soon) }
+    }
+}
+
+/// An instruction set: the tiles that its registers hold.
 pub trait Isa {
-    /// Eight floats in a register.
-    type Vector: Vector;
     /// Panels of a tile, where there are enough.
     const TILE_PANELS: usize;
     /// The most entries that a register tile of 1, 2, 3 or 4 panels spans: as many sums as leave registers for the operands, and at
@@ -57,37 +95,16 @@ pub trait Isa {
 pub struct Portable;
 
 impl Isa for Portable {
-    type Vector = Lanes;
     const TILE_PANELS: usize = 2;
     const TILE_ENTRIES: [usize; 5] = [0, 10, 6, 3, 0];
     #[inline(never)]
     unsafe fn tiles<const S: usize>(panels: usize, entries: usize, count: usize, first: Tile) {
         // SAFETY: the caller's.
-        unsafe { super::tiles::any_tiles::<Self, S>(panels, entries, count, first) }
+        unsafe { super::tiles::any_tiles::<Lanes, S>(panels, entries, count, first) }
     }
 }
 
-impl Vector for Lanes {
-    #[inline(always)]
-    unsafe fn load(from: *const Lanes) -> Self {
-        // SAFETY: the caller's.
-        unsafe { *from }
-    }
-    #[inline(always)]
-    unsafe fn load_row(from: *const f32) -> Self {
-        // SAFETY: the caller's; floats lie side by side in an array.
-        Lanes(unsafe { *from.cast::<[f32; LANES]>() })
-    }
-    #[inline(always)]
-    unsafe fn store(self, to: *mut Lanes) {
-        // SAFETY: the caller's.
-        unsafe { *to = self }
-    }
-    #[inline(always)]
-    unsafe fn store_row(self, to: *mut f32) {
-        // SAFETY: as `load_row`.
-        unsafe { *to.cast::<[f32; LANES]>() = self.0 }
-    }
+impl Arithmetic for Lanes {
     #[inline(always)]
     unsafe fn splat(value: f32) -> Self {
         Lanes::splat(value)
@@ -120,6 +137,29 @@ impl Vector for Lanes {
     #[inline(always)]
     unsafe fn where_positive(self, y: Self) -> Self {
         Lanes(std::array::from_fn(|i| if y.0[i] > 0.0 { self.0[i] } else { 0.0 }))
+    }
+}
+
+impl Vector for Lanes {
+    #[inline(always)]
+    unsafe fn load(from: *const Lanes) -> Self {
+        // SAFETY: the caller's.
+        unsafe { *from }
+    }
+    #[inline(always)]
+    unsafe fn load_row(from: *const f32) -> Self {
+        // SAFETY: the caller's; floats lie side by side in an array.
+        Lanes(unsafe { *from.cast::<[f32; LANES]>() })
+    }
+    #[inline(always)]
+    unsafe fn store(self, to: *mut Lanes) {
+        // SAFETY: the caller's.
+        unsafe { *to = self }
+    }
+    #[inline(always)]
+    unsafe fn store_row(self, to: *mut f32) {
+        // SAFETY: as `load_row`.
+        unsafe { *to.cast::<[f32; LANES]>() = self.0 }
     }
     #[inline(always)]
     unsafe fn transposed(square: [Self; LANES]) -> [Self; LANES] {
