@@ -1,9 +1,9 @@
 //! Time of one update: Algorithm 1 on 1, 16 and 32 demos of 150 steps (behavior cloning, state cloning, dynamics fine-tuning; D = 32, 9
 //! actions, 3 x 100 tanh, rho .45), and behavior cloning alone on 512 pairs, on one and on two threads; beside it, the share of the
-//! processor's f32 peak, measured here by loops of fused multiplications and additions in its widest registers. Only the matrix products of the two networks
-//! count as operations: not tanh, features, losses or Adam, nor idle lanes, nor the first steps that behavior cloning has already done.
+//! processor's f32 peak, measured here by loops of fused multiplications and additions in its widest registers. Only the matrix products
+//! of the two networks count as operations: not tanh, features, losses or Adam, nor idle lanes, nor the first steps that behavior cloning
+//! has already done. Prints a table in Markdown.
 
-use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use hilt::config::{PretrainSettings, TrainSettings};
 use hilt::demo::Demo;
 use hilt::interrupt::Interrupt;
@@ -14,7 +14,7 @@ use hilt::robot::READY_Q_RAD;
 use hilt::state::{CONTROL_DT_S, JOINTS};
 use hilt::tasks::Task;
 use std::collections::HashMap;
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
 const STEPS: usize = 150;
 const DEMOS: usize = 32;
@@ -135,8 +135,8 @@ struct Yardstick {
 }
 
 impl Yardstick {
-    /// Prints how close to `threads` cores' peak the fastest repetition of `work` comes, which returns its operations, and how much
-    /// faster it is than on the first number of threads.
+    /// Prints the row of `work`, which returns its operations: its fastest repetition, how close that comes to `threads` cores' peak, and
+    /// how much faster it is than on the first number of threads.
     fn report(&mut self, name: &str, threads: usize, mut work: impl FnMut() -> u64) {
         self.peak = peak_flops().into_iter().map(|(_, rate)| rate).fold(self.peak, f64::max);
         let once = |_| {
@@ -148,62 +148,44 @@ impl Yardstick {
         let (seconds, flops) = repetitions.max_by(|a, b| (a.1 / a.0).total_cmp(&(b.1 / b.0))).expect("repetitions");
         let rate = flops / seconds;
         let gain = rate / *self.rates.entry(name.into()).or_insert(rate);
-        let peak = self.peak * threads as f64;
-        println!(
-            "{name}/threads{threads}: {:.2} ms, {:.1} GFLOP/s in matrix products, {:.0} % of {:.1}, {gain:.2} times one thread",
-            1e3 * seconds,
-            rate / 1e9,
-            100.0 * rate / peak,
-            peak / 1e9
-        );
+        let (time, share) = (1e3 * seconds, 100.0 * rate / (self.peak * threads as f64));
+        println!("| {name} | {threads} | {time:.3} | {:.0} | {share:.0} % | {gain:.2} |", rate / 1e9);
     }
 }
 
-fn updates(criterion: &mut Criterion) {
-    let mut yardstick = Yardstick::default();
+fn main() {
     kernel::choose().expect("HILT_KERNEL names a kernel of this processor");
     println!("kernel: {}", kernel::describe());
     for (width, peak) in peak_flops() {
         println!("peak of one core in registers of {} bits: {:.1} GFLOP/s", 32 * width, peak / 1e9);
     }
+    println!(
+        "\n| update | threads | ms | GFLOP/s in matrix products | of the peak | times one thread |\n|---|---|---|---|---|---|"
+    );
+    let mut yardstick = Yardstick::default();
     for threads in [1, 2] {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads start");
-        let mut learner = learner();
-        let mut group = criterion.benchmark_group("hil_update");
-        for size in [1, 16, 32] {
-            let demos: Vec<usize> = (0..size).collect();
-            let mut rows = Vec::new();
-            learner.rows_of(&demos, &mut rows);
-            pool.install(|| {
-                yardstick.report(&format!("hil_update/B{size}"), threads, || {
-                    hil_update(&mut learner, &demos, &rows);
-                    // the segments, drawn anew every time, decide how many first steps behavior cloning has already done
-                    learner.flops_per_update(rows.len() as u64, learner.segments().len() as u64)
-                });
-            });
-            group.throughput(Throughput::Elements(size as u64)); // trajectories
-            group.bench_function(format!("B{size}/threads{threads}"), |bencher| {
-                pool.install(|| bencher.iter(|| hil_update(&mut learner, &demos, &rows)));
-            });
-        }
-        group.finish();
-        let rows: Vec<usize> = (0..512).map(|i| i * 7 % (DEMOS * STEPS)).collect();
-        let mut bc_update = || {
-            learner.behavior_cloning(&rows, 512.0 / STEPS as f64).expect("finite");
-            learner.update(0.0, 1.0, LEARNING_RATE);
-            learner.bc_flops_per_update(rows.len() as u64)
-        };
-        let mut group = criterion.benchmark_group("bc_update");
-        pool.install(|| yardstick.report("bc_update/512", threads, &mut bc_update));
-        group.throughput(Throughput::Elements(rows.len() as u64)); // state-action pairs
-        group.bench_function(format!("512/threads{threads}"), |bencher| pool.install(|| bencher.iter(&mut bc_update)));
-        group.finish();
+        pool.install(|| updates(threads, &mut yardstick));
     }
 }
 
-criterion_group! {
-    name = benches;
-    config = Criterion::default().sample_size(20).warm_up_time(Duration::from_millis(500)).measurement_time(Duration::from_secs(2));
-    targets = updates
+fn updates(threads: usize, yardstick: &mut Yardstick) {
+    let mut learner = learner();
+    for size in [1, 16, 32] {
+        let demos: Vec<usize> = (0..size).collect();
+        let mut rows = Vec::new();
+        learner.rows_of(&demos, &mut rows);
+        yardstick.report(&format!("HIL, {size} demos"), threads, || {
+            hil_update(&mut learner, &demos, &rows);
+            // the segments, drawn anew every time, decide how many first steps behavior cloning has already done
+            learner.flops_per_update(rows.len() as u64, learner.segments().len() as u64)
+        });
+    }
+    let rows: Vec<usize> = (0..512).map(|i| i * 7 % (DEMOS * STEPS)).collect();
+    let demos = rows.len() as f64 / STEPS as f64;
+    yardstick.report("BC, 512 pairs", threads, || {
+        learner.behavior_cloning(&rows, demos).expect("finite");
+        learner.update(0.0, 1.0, LEARNING_RATE);
+        learner.bc_flops_per_update(rows.len() as u64)
+    });
 }
-criterion_main!(benches);

@@ -33,6 +33,11 @@ const ATTEMPTS: usize = 5;
 const BC_PROBE: u64 = 1000;
 const SC_PROBE: u64 = 5;
 
+/// Training as long as more of it still helps somebody: methods are compared at their best, and what is enough for the ordinary tasks is
+/// not enough with few demos. `--set` overrides it.
+pub const THOROUGH: [&str; 4] =
+    ["pretrain.patience=0", "train.warm_start_updates=15000", "train.epochs=60", "train.min_updates=2000"];
+
 /// A trained policy and what it cost.
 #[derive(Clone, Debug)]
 pub struct Trained {

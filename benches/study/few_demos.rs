@@ -1,7 +1,7 @@
 //! Few demos: BC, SC and HIL on the same demos, with the same inputs, in equal time. No pulses: the demos show the way, not the way back.
 
 use crate::Args;
-use crate::chain::Method;
+use crate::chain::{Method, THOROUGH};
 use crate::lab::{Lab, Setup, each};
 use crate::results::{Row, write};
 use anyhow::Result;
@@ -48,13 +48,14 @@ pub fn run(args: &Args) -> Result<()> {
 
 /// All features and methods on one set of demos.
 fn cell(args: &Args, lab: &Lab, demos: u64, seed: u64) -> Result<Vec<Row>> {
-    let sets = [
+    let own = [
         "simulate.pulses.probability=0".to_string(),
         format!("convert.demos={demos}"),
         format!("plan.episodes={}", demos + demos / SPARE_SHARE + SPARE),
         format!("evaluate.episodes={}", args.episodes),
     ];
-    let setup = Setup { pipeline: args.pipeline.clone(), sets: sets.to_vec(), seed }.with(&args.set);
+    let sets = [THOROUGH.map(String::from).as_slice(), &own].concat();
+    let setup = Setup { pipeline: args.pipeline.clone(), sets, seed }.with(&args.set);
     let label = format!("{demos}-seed-{seed}");
     let made = lab.demos(&label, &setup)?;
     let methods = args.methods_or(&[Method::Bc, Method::Sc, Method::Hil]);

@@ -1,7 +1,7 @@
 //! Off the beaten track: BC and HIL in scenes that their demos do not show, and trained again on demos that do.
 
 use crate::Args;
-use crate::chain::Method;
+use crate::chain::{Method, THOROUGH};
 use crate::lab::{Lab, Setup, each};
 use crate::results::{Row, write};
 use anyhow::{Context, Result};
@@ -38,7 +38,8 @@ fn all() -> Result<Vec<String>> {
 }
 
 fn setup(args: &Args, pipeline: PathBuf, seed: u64) -> Setup {
-    Setup { pipeline, sets: vec![format!("evaluate.episodes={}", args.episodes)], seed }.with(&args.set)
+    let sets = THOROUGH.map(String::from).into_iter().chain([format!("evaluate.episodes={}", args.episodes)]).collect();
+    Setup { pipeline, sets, seed }.with(&args.set)
 }
 
 /// The ordinary policies in the ordinary scene.

@@ -1,10 +1,9 @@
 //! Products compiled for registers of sixteen floats: two neighbouring panels of eight are joined when they are read and parted when they
-//! are written, so that samples lie in memory as for every other path. The sums are the same to the bit. A panel that has no neighbour,
-//! and three of them, go as with AVX-512VL.
+//! are written, so that samples lie in memory as for every other path. The sums are the same to the bit. A panel that has no neighbour is
+//! joined with itself.
 
 use super::super::lanes::Lanes;
 use super::Product;
-use super::avx512vl;
 use super::tiles::{Tile, tiles};
 use super::vector::{Arithmetic, Isa, Panels};
 use std::arch::x86_64::*;
@@ -81,20 +80,19 @@ impl Panels for Pair {
     }
 }
 
-/// AVX-512: 24 of 32 registers hold sums.
+/// AVX-512: 26 of 32 registers hold sums.
 struct Avx512;
 
 impl Isa for Avx512 {
     const TILE_PANELS: usize = 4;
-    const TILE_ENTRIES: [usize; 5] = [0, 10, 12, 8, 12];
+    const TILE_ENTRIES: [usize; 5] = [0, 13, 13, 13, 13];
     #[inline(always)]
     unsafe fn tiles<const S: usize>(panels: usize, entries: usize, count: usize, first: Tile) {
         // SAFETY: the caller's.
         unsafe {
             match panels {
-                2 => of_pairs::<S, 1>(entries, count, first),
-                4 => of_pairs::<S, 2>(entries, count, first),
-                _ => avx512vl::any_tiles::<S>(panels, entries, count, first),
+                1 | 2 => of_pairs::<S, 1>(entries, count, first.odd(panels == 1)),
+                _ => of_pairs::<S, 2>(entries, count, first.odd(panels == 3)),
             }
         }
     }
@@ -122,6 +120,7 @@ unsafe fn of_pairs<const S: usize, const P: usize>(entries: usize, count: usize,
             10 => tiles::<Pair, S, P, 10>(count, first),
             11 => tiles::<Pair, S, P, 11>(count, first),
             12 => tiles::<Pair, S, P, 12>(count, first),
+            13 => tiles::<Pair, S, P, 13>(count, first),
             _ => unreachable!("no tile spans {entries} entries"),
         }
     }

@@ -20,11 +20,9 @@ impl Isa for Avx512Vl {
     }
 }
 
-/// # Safety
-/// As [`super::tiles::any_tiles`].
 #[target_feature(enable = "avx2,fma,avx512f,avx512vl")]
 #[inline(never)]
-pub unsafe fn any_tiles<const S: usize>(panels: usize, entries: usize, count: usize, first: Tile) {
+unsafe fn any_tiles<const S: usize>(panels: usize, entries: usize, count: usize, first: Tile) {
     // SAFETY: the caller's.
     unsafe { super::tiles::any_large_tiles::<__m256, S>(panels, entries, count, first) }
 }

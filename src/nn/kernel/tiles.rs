@@ -12,6 +12,8 @@ pub struct Tile {
     width: usize,
     x: *const Lanes,
     depth: usize,
+    /// Whether the last register's last panel is missing.
+    odd: bool,
     a: *const f32,
     /// Coefficients lie in `blocks` of `inner`; distances in floats.
     blocks: usize,
@@ -112,8 +114,20 @@ impl Tile {
                 Finish::ReluSlope(y) => TileFinish::ReluSlope(y.as_ptr().add(place)),
             };
             let (result, x) = (result.as_mut_ptr().add(place), of.x.as_ptr().add(p * depth));
-            Tile { result, width, x, depth, a, blocks, between_blocks, inner, between_k, start, finish }
+            Tile { result, width, x, depth, odd: false, a, blocks, between_blocks, inner, between_k, start, finish }
         }
+    }
+
+    /// The same tile, where the last register has a panel less than it could hold: the one before stands in its place, too.
+    #[inline(always)]
+    pub fn odd(self, odd: bool) -> Tile {
+        Tile { odd, ..self }
+    }
+
+    /// How far apart the panels of the last register lie when those of others are `between` apart.
+    #[inline(always)]
+    fn last_between(&self, between: usize) -> usize {
+        if self.odd { 0 } else { between }
     }
 
     /// The tile that begins `entries` later, coefficients of neighbouring entries being `between` floats apart.
@@ -162,11 +176,11 @@ unsafe fn sums<V: Panels, const S: usize, const P: usize, const F: usize>(tile: 
     // SAFETY: the caller's.
     unsafe {
         let mut sums = [[V::splat(0.0); P]; F];
-        let (mut x, mut block) = (tile.x, tile.a);
+        let (mut x, mut block, between) = (tile.x, tile.a, [tile.depth, tile.last_between(tile.depth)]);
         for _ in 0..tile.blocks {
             let mut a = block;
             for _ in 0..tile.inner {
-                step::<V, S, P, F>(&mut sums, a, x, tile.depth);
+                step::<V, S, P, F>(&mut sums, a, x, between);
                 (a, x) = (a.wrapping_add(tile.between_k), x.wrapping_add(1));
             }
             block = block.wrapping_add(tile.between_blocks);
@@ -175,17 +189,20 @@ unsafe fn sums<V: Panels, const S: usize, const P: usize, const F: usize>(tile: 
     }
 }
 
-/// Adds one k to the sums: its coefficients begin at `a`, its samples at `x`.
+/// Adds one k to the sums: its coefficients begin at `a`, its samples at `x`, in panels `depth` apart, in the last register `last` apart.
 #[inline(always)]
 unsafe fn step<V: Panels, const S: usize, const P: usize, const F: usize>(
     sums: &mut [[V; P]; F],
     a: *const f32,
     x: *const Lanes,
-    depth: usize,
+    [depth, last]: [usize; 2],
 ) {
     // SAFETY: the caller's.
     unsafe {
-        let samples: [V; P] = std::array::from_fn(|p| V::load(x.wrapping_add(p * V::COUNT * depth), depth));
+        let samples: [V; P] = std::array::from_fn(|p| {
+            let between = if p + 1 < P { depth } else { last };
+            V::load(x.wrapping_add(p * V::COUNT * depth), between)
+        });
         for (f, sums) in sums.iter_mut().enumerate() {
             let a = V::splat(*a.add(f * S));
             for (sum, sample) in sums.iter_mut().zip(samples) {
@@ -198,8 +215,8 @@ unsafe fn step<V: Panels, const S: usize, const P: usize, const F: usize>(
 /// `$each` for every entry f and panel p of a tile of F entries, written out: in loops the sums would lie in memory.
 macro_rules! each {
     ($sums:ident, |$f:ident, $p:ident, $sum:ident| $each:expr) => {{
-        const { assert!(F <= 12, "an entry for each number below") }
-        each!($sums, |$f, $p, $sum| $each, 0 1 2 3 4 5 6 7 8 9 10 11)
+        const { assert!(F <= 13, "an entry for each number below") }
+        each!($sums, |$f, $p, $sum| $each, 0 1 2 3 4 5 6 7 8 9 10 11 12)
     }};
     ($sums:ident, |$f:ident, $p:ident, $sum:ident| $each:expr, $($entry:literal)*) => {{
         $(
@@ -216,23 +233,26 @@ macro_rules! each {
 /// What the sums begin with and what is made of them, asked once a tile: asked once a sum it takes a hundred cycles.
 #[inline(always)]
 unsafe fn finish<V: Panels, const P: usize, const F: usize>(tile: &Tile, mut sums: [[V; P]; F]) {
-    let width = tile.width;
+    let (width, last) = (tile.width, tile.last_between(tile.width));
     let place = |f: usize, p: usize| p * V::COUNT * width + f;
+    let between = |p: usize| if p + 1 < P { width } else { last };
     // SAFETY: the caller's; `place` is where entry f of register p's first panel lies after the tile's first.
     unsafe {
         match tile.start {
             TileStart::Zero => {}
-            TileStart::Result => each!(sums, |f, p, sum| *sum = sum.add(V::load(tile.result.add(place(f, p)), width))),
+            TileStart::Result => each!(sums, |f, p, sum| *sum = sum.add(V::load(tile.result.add(place(f, p)), between(p)))),
             TileStart::Bias(bias) => each!(sums, |f, _p, sum| *sum = sum.add(V::splat(*bias.add(f)))),
         }
         match tile.finish {
             TileFinish::Nothing => {}
             TileFinish::Tanh => each!(sums, |_f, _p, sum| *sum = tanh(*sum)),
             TileFinish::Relu => each!(sums, |_f, _p, sum| *sum = sum.positive()),
-            TileFinish::TanhSlope(y) => each!(sums, |f, p, sum| *sum = tanh_slope(*sum, V::load(y.add(place(f, p)), width))),
-            TileFinish::ReluSlope(y) => each!(sums, |f, p, sum| *sum = sum.where_positive(V::load(y.add(place(f, p)), width))),
+            TileFinish::TanhSlope(y) => each!(sums, |f, p, sum| *sum = tanh_slope(*sum, V::load(y.add(place(f, p)), between(p)))),
+            TileFinish::ReluSlope(y) => {
+                each!(sums, |f, p, sum| *sum = sum.where_positive(V::load(y.add(place(f, p)), between(p))))
+            }
         }
-        each!(sums, |f, p, sum| sum.store(tile.result.add(place(f, p)), width));
+        each!(sums, |f, p, sum| sum.store(tile.result.add(place(f, p)), between(p)));
     }
 }
 
