@@ -1,4 +1,4 @@
-//! Products compiled for registers of sixteen floats: two neighbouring panels of eight are joined when they are read and parted when they
+//! Products compiled for registers of sixteen floats: two neighbouring panels of eight are joined before they are read and parted when they
 //! are written, so that samples lie in memory as for every other path. The sums are the same to the bit. A panel that has no neighbour is
 //! joined with itself.
 
@@ -7,6 +7,7 @@ use super::Product;
 use super::tiles::{Tile, tiles};
 use super::vector::{Arithmetic, Isa, Panels};
 use std::arch::x86_64::*;
+use std::cell::RefCell;
 
 /// The same entry of two neighbouring panels.
 #[derive(Clone, Copy)]
@@ -58,6 +59,11 @@ impl Arithmetic for Pair {
 impl Panels for Pair {
     const COUNT: usize = 2;
     #[inline(always)]
+    unsafe fn load_samples(from: *const Lanes) -> Self {
+        // SAFETY: as below; they lie in a `Joined`.
+        Pair(unsafe { _mm512_load_ps(from.cast()) })
+    }
+    #[inline(always)]
     unsafe fn load(from: *const Lanes, between: usize) -> Self {
         // SAFETY: the caller's; Lanes are aligned to 32 bytes, and the processor has AVX-512DQ.
         unsafe {
@@ -80,12 +86,44 @@ impl Panels for Pair {
     }
 }
 
+/// An entry of two panels side by side.
+#[derive(Clone, Copy)]
+#[repr(align(64))]
+struct Joined(#[expect(dead_code, reason = "read by its address")] [Lanes; 2]);
+
+thread_local! {
+    /// The samples of the tiles under way. Each is read by several tiles: joined once, they cost one instruction a tile and not two.
+    static JOINED: RefCell<Vec<Joined>> = const { RefCell::new(Vec::new()) };
+}
+
+/// Joins pairs of panels of `depth` entries; one without a neighbour with itself.
+#[target_feature(enable = "avx2,fma,avx512f,avx512vl,avx512dq")]
+unsafe fn join(joined: &mut Vec<Joined>, x: &[Lanes], depth: usize) {
+    let empty = Joined([Lanes::default(); 2]);
+    joined.resize(joined.len().max(x.len().div_ceil(2 * depth) * depth), empty);
+    for (pair, to) in x.chunks(2 * depth).zip(joined.chunks_exact_mut(depth)) {
+        let between = pair.len() - depth;
+        for (from, to) in pair[..depth].iter().zip(to) {
+            // SAFETY: entry k of the second panel, or of the only one, lies `between` after entry k of the first.
+            unsafe { _mm512_store_ps(std::ptr::from_mut(to).cast(), Pair::load(from, between).0) }
+        }
+    }
+}
+
 /// AVX-512: 26 of 32 registers hold sums.
 struct Avx512;
 
 impl Isa for Avx512 {
     const TILE_PANELS: usize = 4;
     const TILE_ENTRIES: [usize; 5] = [0, 13, 13, 13, 13];
+    #[inline(always)]
+    unsafe fn samples(x: &[Lanes], depth: usize) -> *const Lanes {
+        JOINED.with_borrow_mut(|joined| {
+            // SAFETY: the caller's.
+            unsafe { join(joined, x, depth) };
+            joined.as_ptr().cast()
+        })
+    }
     #[inline(always)]
     unsafe fn tiles<const S: usize>(panels: usize, entries: usize, count: usize, first: Tile) {
         // SAFETY: the caller's.

@@ -49,6 +49,8 @@ pub unsafe fn product<T: Isa>(result: &mut [Lanes], width: usize, of: &Product) 
     let mut p = 0;
     for (panels, times) in spans(of.x.len() / of.depth, T::TILE_PANELS) {
         for _ in 0..times {
+            // SAFETY: the processor has T's instructions.
+            let x = unsafe { T::samples(&of.x[p * of.depth..(p + panels) * of.depth], of.depth) };
             let mut f = 0;
             for (entries, count) in runs(width, T::TILE_ENTRIES[panels]) {
                 // SAFETY: the tiles read entries 0..depth of panels p.. of x, biases f.. and activations at the result's place, and write
@@ -57,8 +59,10 @@ pub unsafe fn product<T: Isa>(result: &mut [Lanes], width: usize, of: &Product) 
                 // * width. `result` is borrowed mutably: nothing else aliases it.
                 unsafe {
                     match of.a {
-                        Coefficients::Matrix(_) => T::tiles::<1>(panels, entries, count, Tile::new(result, width, of, p, f)),
-                        Coefficients::Samples(_) => T::tiles::<LANES>(panels, entries, count, Tile::new(result, width, of, p, f)),
+                        Coefficients::Matrix(_) => T::tiles::<1>(panels, entries, count, Tile::new(result, width, of, x, p, f)),
+                        Coefficients::Samples(_) => {
+                            T::tiles::<LANES>(panels, entries, count, Tile::new(result, width, of, x, p, f))
+                        }
                     }
                 }
                 f += entries * count;
@@ -88,12 +92,12 @@ pub fn runs(n: usize, most: usize) -> impl Iterator<Item = (usize, usize)> {
 }
 
 impl Tile {
-    /// The tile whose first entry is `f` of panel `p`.
+    /// The tile whose first entry is `f` of panel `p`, its samples at `x`.
     ///
     /// # Safety
     /// That entry exists.
     #[inline(always)]
-    unsafe fn new(result: &mut [Lanes], width: usize, of: &Product, p: usize, f: usize) -> Tile {
+    unsafe fn new(result: &mut [Lanes], width: usize, of: &Product, x: *const Lanes, p: usize, f: usize) -> Tile {
         let (place, depth) = (p * width + f, of.depth);
         // SAFETY: the caller's.
         unsafe {
@@ -113,7 +117,7 @@ impl Tile {
                 Finish::TanhSlope(y) => TileFinish::TanhSlope(y.as_ptr().add(place)),
                 Finish::ReluSlope(y) => TileFinish::ReluSlope(y.as_ptr().add(place)),
             };
-            let (result, x) = (result.as_mut_ptr().add(place), of.x.as_ptr().add(p * depth));
+            let result = result.as_mut_ptr().add(place);
             Tile { result, width, x, depth, odd: false, a, blocks, between_blocks, inner, between_k, start, finish }
         }
     }
@@ -122,12 +126,6 @@ impl Tile {
     #[inline(always)]
     pub fn odd(self, odd: bool) -> Tile {
         Tile { odd, ..self }
-    }
-
-    /// How far apart the panels of the last register lie when those of others are `between` apart.
-    #[inline(always)]
-    fn last_between(&self, between: usize) -> usize {
-        if self.odd { 0 } else { between }
     }
 
     /// The tile that begins `entries` later, coefficients of neighbouring entries being `between` floats apart.
@@ -176,12 +174,12 @@ unsafe fn sums<V: Panels, const S: usize, const P: usize, const F: usize>(tile: 
     // SAFETY: the caller's.
     unsafe {
         let mut sums = [[V::splat(0.0); P]; F];
-        let (mut x, mut block, between) = (tile.x, tile.a, [tile.depth, tile.last_between(tile.depth)]);
+        let (mut x, mut block) = (tile.x, tile.a);
         for _ in 0..tile.blocks {
             let mut a = block;
             for _ in 0..tile.inner {
-                step::<V, S, P, F>(&mut sums, a, x, between);
-                (a, x) = (a.wrapping_add(tile.between_k), x.wrapping_add(1));
+                step::<V, S, P, F>(&mut sums, a, x, tile.depth);
+                (a, x) = (a.wrapping_add(tile.between_k), x.wrapping_add(V::COUNT));
             }
             block = block.wrapping_add(tile.between_blocks);
         }
@@ -189,20 +187,17 @@ unsafe fn sums<V: Panels, const S: usize, const P: usize, const F: usize>(tile: 
     }
 }
 
-/// Adds one k to the sums: its coefficients begin at `a`, its samples at `x`, in panels `depth` apart, in the last register `last` apart.
+/// Adds one k to the sums: its coefficients begin at `a`, its samples at `x`.
 #[inline(always)]
 unsafe fn step<V: Panels, const S: usize, const P: usize, const F: usize>(
     sums: &mut [[V; P]; F],
     a: *const f32,
     x: *const Lanes,
-    [depth, last]: [usize; 2],
+    depth: usize,
 ) {
     // SAFETY: the caller's.
     unsafe {
-        let samples: [V; P] = std::array::from_fn(|p| {
-            let between = if p + 1 < P { depth } else { last };
-            V::load(x.wrapping_add(p * V::COUNT * depth), between)
-        });
+        let samples: [V; P] = std::array::from_fn(|p| V::load_samples(x.wrapping_add(p * V::COUNT * depth)));
         for (f, sums) in sums.iter_mut().enumerate() {
             let a = V::splat(*a.add(f * S));
             for (sum, sample) in sums.iter_mut().zip(samples) {
@@ -233,7 +228,7 @@ macro_rules! each {
 /// What the sums begin with and what is made of them, asked once a tile: asked once a sum it takes a hundred cycles.
 #[inline(always)]
 unsafe fn finish<V: Panels, const P: usize, const F: usize>(tile: &Tile, mut sums: [[V; P]; F]) {
-    let (width, last) = (tile.width, tile.last_between(tile.width));
+    let (width, last) = (tile.width, if tile.odd { 0 } else { tile.width });
     let place = |f: usize, p: usize| p * V::COUNT * width + f;
     let between = |p: usize| if p + 1 < P { width } else { last };
     // SAFETY: the caller's; `place` is where entry f of register p's first panel lies after the tile's first.

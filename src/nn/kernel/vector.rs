@@ -50,6 +50,8 @@ pub trait Vector: Arithmetic {
 pub trait Panels: Arithmetic {
     /// How many panels.
     const COUNT: usize;
+    /// The same entry of samples that lie as [`Isa::samples`] has them.
+    unsafe fn load_samples(from: *const Lanes) -> Self;
     /// The entry at `from` and its like in the panels after, `between` entries apart.
     unsafe fn load(from: *const Lanes, between: usize) -> Self;
     unsafe fn store(self, to: *mut Lanes, between: usize);
@@ -60,8 +62,13 @@ pub trait Panels: Arithmetic {
 impl<V: Vector> Panels for V {
     const COUNT: usize = 1;
     #[inline(always)]
-    unsafe fn load(from: *const Lanes, _: usize) -> Self {
+    unsafe fn load_samples(from: *const Lanes) -> Self {
         // SAFETY: the caller's, here and below.
+        unsafe { V::load(from) }
+    }
+    #[inline(always)]
+    unsafe fn load(from: *const Lanes, _: usize) -> Self {
+        // SAFETY: as above.
         unsafe { V::load(from) }
     }
     #[inline(always)]
@@ -83,6 +90,15 @@ pub trait Isa {
     /// The most entries that a register tile of 1, 2, 3 or 4 panels spans: as many sums as leave registers for the operands, and at
     /// least 8, which hide the latency of FMA. A single panel is bound by loads, whatever it spans.
     const TILE_ENTRIES: [usize; 5];
+    /// Where the tiles of these panels read their samples: register by register, an entry of a register's panels after the other. What is
+    /// returned holds until this thread asks again.
+    ///
+    /// # Safety
+    /// The processor has the instructions.
+    #[inline(always)]
+    unsafe fn samples(x: &[Lanes], _depth: usize) -> *const Lanes {
+        x.as_ptr()
+    }
     /// [`super::tiles::any_tiles`], compiled by itself: merged into its caller the compiler would know `inner` and unroll that loop, to
     /// its harm.
     ///
