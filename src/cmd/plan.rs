@@ -26,7 +26,7 @@ pub struct Args {
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
     /// Do only share I of N, into the directory beside the file, <name>.unfinished; without --shard the shares in there are put together
-    #[arg(long, value_name = "I/N")]
+    #[arg(long, value_name = "I/N", allow_hyphen_values = true)]
     shard: Option<Shard>,
 }
 
@@ -61,7 +61,11 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome> {
         }
         None => stage.put_together(&out, &blocks).map(Some),
     });
-    let Some(reasons) = done.map_err(|why| work.explain(why))? else { return Ok(Outcome::Done) };
+    let reasons = match done {
+        Ok(Some(reasons)) => reasons,
+        Ok(None) => return Ok(Outcome::Done),
+        Err(why) => return Err(work.explain(why)),
+    };
     work.remove()?;
     let outcome = dropped::say("plan", pipeline.plan.episodes as usize, &reasons, ADVICE, &context.console)?;
     context.console.say(&format!("plan: wrote {}", out.display()));

@@ -32,7 +32,7 @@ pub struct Args {
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
     /// Do only share I of N, into the directory beside the output, <name>.unfinished; without --shard the shares in there are put together
-    #[arg(long, value_name = "I/N")]
+    #[arg(long, value_name = "I/N", allow_hyphen_values = true)]
     shard: Option<Shard>,
 }
 
@@ -67,11 +67,15 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome> {
         }
         None => stage.put_together(&out, &numbers).map(|()| true),
     });
-    if done.map_err(|why| work.explain(why))? {
-        work.remove()?;
-        context.console.say(&format!("simulate: wrote {}", out.display()));
+    match done {
+        Ok(true) => {
+            work.remove()?;
+            context.console.say(&format!("simulate: wrote {}", out.display()));
+            Ok(Outcome::Done)
+        }
+        Ok(false) => Ok(Outcome::Done),
+        Err(why) => Err(work.explain(why)),
     }
-    Ok(Outcome::Done)
 }
 
 /// Reads all plans before the work begins, so that what cannot be executed is known then; returns their numbers.

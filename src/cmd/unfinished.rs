@@ -7,7 +7,8 @@
 use super::differences::first_difference;
 use super::shard::Shard;
 use super::{Console, places};
-use crate::data::{ContentHash, Provenance, atomic};
+use crate::data::atomic::{self, Workplace};
+use crate::data::{ContentHash, Provenance};
 use crate::error::{Error, Result};
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -55,11 +56,12 @@ pub struct Unfinished<'a> {
     above: PathBuf,
     /// Of this run.
     dir: PathBuf,
+    workplace: Workplace,
     /// Episodes that are to be done by this command, and how many are.
     total: u64,
     done: AtomicU64,
     /// Of a run whose pieces nobody can go on with.
-    _temporary: Option<TempDir>,
+    temporary: Option<TempDir>,
 }
 
 impl<'a> Unfinished<'a> {
@@ -81,8 +83,10 @@ impl<'a> Unfinished<'a> {
         let above = place.or_else(|| temporary.as_ref().map(|dir| dir.path().to_path_buf())).expect("one of the two is there");
         let hash = ContentHash::of(provenance.to_json().as_bytes()).to_string();
         let dir = above.join(format!("{RUN}{}", &hash[..DIGITS]));
-        [&above, &dir].into_iter().try_for_each(|dir| atomic::make_dir(dir))?;
-        let unfinished = Unfinished { stage, console, above, dir, total, done: AtomicU64::new(0), _temporary: temporary };
+        // What a killed process left while it removed its pieces lies above.
+        Workplace::enter(&above)?;
+        let workplace = Workplace::enter(&dir)?;
+        let unfinished = Unfinished { stage, console, above, dir, workplace, total, done: AtomicU64::new(0), temporary };
         unfinished.say_of_others(provenance, origin);
         Ok(unfinished)
     }
@@ -141,13 +145,13 @@ impl<'a> Unfinished<'a> {
     }
 
     /// The error that ended the stage, with what was kept; nothing stays of a run that has finished nothing.
-    pub fn explain(&self, error: Error) -> Error {
+    pub fn explain(self, error: Error) -> Error {
         let (stage, done, total, dir) = (self.stage, self.done.load(Ordering::Relaxed), self.total, self.dir.display());
         if !self.dir.exists() {
             return Error::Failed(format!("{dir} is gone: the same command has ended elsewhere and put its result in place"));
         }
-        if done == 0 || self._temporary.is_some() {
-            let _ = fs::remove_dir(&self.dir).and_then(|()| fs::remove_dir(&self.above));
+        if done == 0 || self.temporary.is_some() {
+            let _ = self.workplace.remove(true).map(|_| fs::remove_dir(&self.above));
             return error;
         }
         let kept = format!("{done} of {total} episodes are kept in {dir}");
@@ -158,14 +162,17 @@ impl<'a> Unfinished<'a> {
         error
     }
 
-    /// Removes the pieces once the artefact is in place.
+    /// Removes the pieces once the artefact is in place; the last of several processes does.
     ///
     /// # Errors
     /// [`Error::Io`] when the system refuses.
     pub fn remove(self) -> Result<()> {
-        atomic::remove_dir(&self.dir)?;
-        // Other runs may have pieces there.
-        let _ = fs::remove_dir(&self.above);
+        if self.workplace.remove(false)? {
+            // Other runs may have pieces there.
+            let _ = fs::remove_dir(&self.above);
+        } else {
+            self.console.say(&format!("{}: {} stays: another process works on the same run", self.stage, self.dir.display()));
+        }
         Ok(())
     }
 }

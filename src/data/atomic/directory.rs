@@ -34,7 +34,7 @@ pub fn write_dir(path: &Path, ours: impl Fn(&Path) -> bool, fill: impl FnOnce(&P
 ///
 /// # Errors
 /// [`Error::Io`] when the system refuses.
-pub fn remove_dir(path: &Path) -> Result<()> {
+pub(super) fn remove_dir(path: &Path) -> Result<()> {
     let aside = temporary::directory(parent_of(path)?, path)?;
     match fs::rename(path, aside.dir.path().join("old")) {
         Err(e) if e.kind() != ErrorKind::NotFound => Err(Error::io(path, "remove", e)),

@@ -7,8 +7,8 @@ mod pieces;
 mod target;
 mod temporary;
 
-pub use directory::{remove_dir, write_dir};
-pub use pieces::{link, make_dir, write_piece};
+pub use directory::write_dir;
+pub use pieces::{Workplace, link, write_piece};
 pub use target::{Target, follow, target};
 pub(super) use temporary::is_temporary;
 
