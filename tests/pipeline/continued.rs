@@ -14,6 +14,9 @@ const BLOCKS: [&str; 2] = ["--episodes", "140"];
 /// For a busy machine.
 const PATIENCE: Duration = Duration::from_secs(120);
 
+/// What becomes of a file's bytes.
+type Harm = fn(&[u8]) -> Vec<u8>;
+
 /// The arguments of a stage with further words; the last of a flag counts.
 fn with(run: &Run, stage: &str, further: &[&str]) -> Vec<String> {
     run.words(stage).into_iter().chain(further.iter().map(|w| w.to_string())).collect()
@@ -148,7 +151,7 @@ fn shards_of_several_machines_copied_together_are_the_bytes_of_one() {
 fn a_piece_that_is_damaged_or_of_another_episode_is_made_again() {
     let run = Run::finished();
     let before = contents(run.path());
-    let harms: [fn(&[u8]) -> Vec<u8>; 3] = [
+    let harms: [Harm; 3] = [
         |bytes| bytes[..bytes.len() / 2].to_vec(),
         |bytes| bytes.iter().enumerate().map(|(i, byte)| byte ^ u8::from(i == bytes.len() / 2)).collect(),
         |_| Vec::new(),
