@@ -8,7 +8,7 @@ PRESET ?= best
 PIPELINE ?= $(if $(filter paper,$(PRESET)),pipelines/paper/$(TASK).toml,pipelines/$(TASK).toml)
 # hil: hybrid imitation learning; bc: behavior cloning; sc: state cloning. Each has a policy of its own in RUNS/TASK; all share the demos.
 METHOD ?= hil
-# 1: an interrupted training goes on from its checkpoint.
+# 1: an interrupted training goes on from its checkpoint. Planning and simulation go on by themselves.
 RESUME ?=
 # Seconds between two checkpoints of training.
 CHECKPOINT ?= 60

@@ -7,7 +7,7 @@ use hilt::demo::Phase;
 use hilt::interrupt::Interrupt;
 use hilt::math::{acos, cos};
 use hilt::plan::{
-    CLEARANCE_M, GRASP_OVER_CENTER_M, LIFTED_CENTER_M, Limits, Plan, PlanError, Planner, RELEASE_GAP_M, check_ready_pose,
+    CLEARANCE_M, GRASP_OVER_CENTER_M, LIFTED_CENTER_M, Limits, Plan, PlanError, Planner, Plans, RELEASE_GAP_M, check_ready_pose,
     from_table, to_table,
 };
 use hilt::robot::{Arm, POSITION_LIMITS_RAD, READY_Q_RAD};
@@ -18,6 +18,7 @@ use hilt::table::Values;
 use hilt::tasks::{REST_HEIGHT_M, Task, draw_scene};
 use plan_oracle::Oracle;
 use rand::RngExt;
+use std::path::Path;
 
 /// The hand counts as level and the tool as in place within this \[rad\], \[m\].
 const LEVEL_RAD: f64 = 0.035;
@@ -210,6 +211,26 @@ fn tables_hold_plans_exactly_and_refuse_what_is_none() {
     plans[1].scene.obstacles = over_the_wall(0, 0.123_456_789).obstacles;
     let table = to_table(&plans);
     assert_eq!(from_table(&table).unwrap(), plans);
+
+    // In pieces that end anywhere.
+    for size in [1, 7, 100, table.rows()] {
+        let piece = |from: usize| {
+            let to = (from + size).min(table.rows());
+            let mut piece = table.clone();
+            for column in &mut piece.columns {
+                match &mut column.values {
+                    Values::I64(v) => *v = v[from..to].to_vec(),
+                    Values::F64(v) => *v = v[from..to].to_vec(),
+                    Values::Text(v) => *v = v[from..to].to_vec(),
+                    Values::F32(_) | Values::Bool(_) => unreachable!("plans have no such column"),
+                }
+            }
+            Ok(piece)
+        };
+        let pieces = (0..table.rows()).step_by(size).map(piece);
+        let found: Vec<Plan> = Plans::new(Path::new("plans"), pieces).collect::<Result<_, _>>().unwrap();
+        assert_eq!(found, plans, "in pieces of {size} rows");
+    }
 
     let with = |name: &str, change: fn(&mut Values)| {
         let mut table = table.clone();

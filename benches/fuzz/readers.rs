@@ -7,7 +7,7 @@ use hilt::data::{ContentHash, dataset, inspect, json_file, recording, seal, tabl
 use hilt::error::{Error, Result};
 use hilt::interrupt::Interrupt;
 use hilt::learn::{Checkpoint, Dynamics, Policy};
-use hilt::plan::from_table;
+use hilt::plan::{Plans, from_table};
 use hilt::seed::stream;
 use hilt::table::Table;
 use hilt::tensor::NamedTensor;
@@ -209,7 +209,15 @@ impl Reader {
         let misfit = |why| Error::input(path, why);
         match self.name {
             "recording" => recording::read(path)?.0.to_demo().map(drop).map_err(misfit),
-            "plans" => from_table(&table_file::read(path)?.0).map(drop).map_err(misfit),
+            "plans" => {
+                let whole = table_file::read(path).and_then(|(table, _)| from_table(&table).map_err(misfit));
+                let plans = table_file::Reader::open(path)?;
+                let in_pieces = Plans::new(path, plans.tables()?).collect::<Result<Vec<_>>>();
+                if let (Ok(whole), Ok(in_pieces)) = (&whole, &in_pieces) {
+                    assert!(whole == in_pieces, "other plans when read in pieces");
+                }
+                whole.and(in_pieces).map(drop)
+            }
             "dataset" => dataset::read(&self.dir.join("dataset")).map(drop),
             "policy" => {
                 let (tensors, meta, _) = weights::read(path, "policy")?;

@@ -1,7 +1,7 @@
 //! The checkpoint of training as a file beside its result.
 
 use super::Console;
-use super::differences::differences;
+use super::differences::first_difference;
 use crate::data::{Provenance, weights};
 use crate::error::{Error, Result};
 use crate::learn::Checkpoint;
@@ -10,8 +10,6 @@ use std::path::Path;
 
 /// What a checkpoint's name has in place of the ending of the weights that it is for.
 pub const ENDING: &str = "checkpoint.safetensors";
-/// Parts of a provenance, in the order in which two are compared.
-const PARTS: [&str; 7] = ["hilt_version", "schema_version", "stage", "task", "seed", "settings", "inputs"];
 
 /// Reads the checkpoint at `path`; `None` when there is none.
 ///
@@ -28,24 +26,11 @@ pub fn read(path: &Path, ours: &Provenance) -> Result<Option<Checkpoint>> {
     })?;
     match first_difference(&theirs, ours) {
         None => Ok(Some(Checkpoint { tensors, meta })),
-        Some((key, theirs, ours)) => Err(Error::input(
+        Some(found) => Err(Error::input(
             path,
-            format!(
-                "is the checkpoint of another run: {key} was {theirs}, now it is {ours}; go on with the old one, or give another --out; {anew}"
-            ),
+            format!("is the checkpoint of another run: {found}; go on with the old one, or give another --out; {anew}"),
         )),
     }
-}
-
-/// The first key in which two provenances differ, and both values.
-fn first_difference(theirs: &Provenance, ours: &Provenance) -> Option<(String, String, String)> {
-    let value = |provenance: &Provenance| serde_json::to_value(provenance).expect("a provenance has string keys only");
-    let (theirs, ours) = (value(theirs), value(ours));
-    let found = PARTS.iter().find_map(|part| {
-        let name = if *part == "settings" { "" } else { part };
-        differences(name, &theirs[*part], &ours[*part]).into_iter().next()
-    });
-    found.map(|found| (found.key, found.theirs.to_string(), found.ours.to_string()))
 }
 
 /// Keeps the checkpoint of one run.
@@ -94,29 +79,5 @@ impl<'a> Keeper<'a> {
             Err(e) if e.kind() != std::io::ErrorKind::NotFound => Err(Error::io(self.path, "remove", e)),
             _ => Ok(()),
         }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::tasks::Task;
-    use serde_json::json;
-
-    #[test]
-    fn the_first_difference_has_its_key_and_both_values() {
-        let one = Provenance::new("train", Task::Stack, json!({"method": "hil", "train": {"rho": 0.3, "tau": 0.5}}), 1);
-        let difference = |change: fn(&mut Provenance)| {
-            let mut other = one.clone();
-            change(&mut other);
-            first_difference(&one, &other)
-        };
-        let found = |key: &str, theirs: &str, ours: &str| Some((key.to_string(), theirs.to_string(), ours.to_string()));
-        assert_eq!(difference(|_| {}), None);
-        assert_eq!(difference(|p| p.seed = 2), found("seed", "1", "2"));
-        assert_eq!(difference(|p| p.settings["train"]["rho"] = 0.4.into()), found("train.rho", "0.3", "0.4"));
-        assert_eq!(difference(|p| p.settings["method"] = "bc".into()), found("method", "\"hil\"", "\"bc\""));
-        let with_input = |p: &mut Provenance| drop(p.inputs.insert("dataset".into(), "ab".into()));
-        assert_eq!(difference(with_input), found("inputs.dataset", "\"missing\"", "\"ab\""));
     }
 }

@@ -1,6 +1,11 @@
-//! In which keys two settings differ.
+//! In which keys two settings, or two provenances, differ.
 
+use crate::data::Provenance;
 use serde_json::{Map, Value};
+use std::fmt;
+
+/// Parts of a provenance, in the order in which two are compared.
+const PARTS: [&str; 7] = ["hilt_version", "schema_version", "stage", "task", "seed", "settings", "inputs"];
 
 /// A dotted key and its two values.
 #[derive(Clone, Debug, PartialEq)]
@@ -11,6 +16,22 @@ pub struct Difference {
     pub theirs: Value,
     /// Its value here, or the word "missing".
     pub ours: Value,
+}
+
+impl fmt::Display for Difference {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{} was {}, now it is {}", self.key, self.theirs, self.ours)
+    }
+}
+
+/// The first key in which two provenances differ.
+pub fn first_difference(theirs: &Provenance, ours: &Provenance) -> Option<Difference> {
+    let value = |provenance: &Provenance| serde_json::to_value(provenance).expect("a provenance has string keys only");
+    let (theirs, ours) = (value(theirs), value(ours));
+    PARTS.iter().find_map(|part| {
+        let name = if *part == "settings" { "" } else { part };
+        differences(name, &theirs[*part], &ours[*part]).into_iter().next()
+    })
 }
 
 /// All keys whose values differ, under the dotted name `root`: first those of `theirs`.
@@ -35,5 +56,29 @@ fn flatten(name: &str, value: &Value, out: &mut Vec<(String, Value)>) {
             flatten(&name, value, out);
         }),
         other => out.push((name.into(), other.clone())),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::tasks::Task;
+    use serde_json::json;
+
+    #[test]
+    fn the_first_difference_has_its_key_and_both_values() {
+        let one = Provenance::new("train", Task::Stack, json!({"method": "hil", "train": {"rho": 0.3, "tau": 0.5}}), 1);
+        let difference = |change: fn(&mut Provenance)| {
+            let mut other = one.clone();
+            change(&mut other);
+            first_difference(&one, &other).map(|found| found.to_string())
+        };
+        let found = |key: &str, theirs: &str, ours: &str| Some(format!("{key} was {theirs}, now it is {ours}"));
+        assert_eq!(difference(|_| {}), None);
+        assert_eq!(difference(|p| p.seed = 2), found("seed", "1", "2"));
+        assert_eq!(difference(|p| p.settings["train"]["rho"] = 0.4.into()), found("train.rho", "0.3", "0.4"));
+        assert_eq!(difference(|p| p.settings["method"] = "bc".into()), found("method", "\"hil\"", "\"bc\""));
+        let with_input = |p: &mut Provenance| drop(p.inputs.insert("dataset".into(), "ab".into()));
+        assert_eq!(difference(with_input), found("inputs.dataset", "\"missing\"", "\"ab\""));
     }
 }

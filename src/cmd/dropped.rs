@@ -22,10 +22,18 @@ pub fn keep<T>(stage: &str, items: Vec<Kept<T>>, advice: &str, console: &Console
             Err(reason) => reasons.push(reason),
         }
     }
+    Ok((kept, say(stage, total, &reasons, advice, console)?))
+}
+
+/// Says which of `total` episodes fell out, for these `reasons`.
+///
+/// # Errors
+/// As [`keep`].
+pub fn say(stage: &str, total: usize, reasons: &[String], advice: &str, console: &Console) -> Result<Outcome> {
     let Some(first) = reasons.first() else {
-        return Ok((kept, Outcome::Done));
+        return Ok(Outcome::Done);
     };
-    if kept.is_empty() {
+    if reasons.len() == total {
         let all = if total == 1 {
             "the only episode was dropped".into()
         } else {
@@ -38,5 +46,5 @@ pub fn keep<T>(stage: &str, items: Vec<Kept<T>>, advice: &str, console: &Console
     if reasons.len() > NAMED {
         console.say(&format!("  and {} more", reasons.len() - NAMED));
     }
-    Ok((kept, Outcome::Dropped(reasons.len() as u64)))
+    Ok(Outcome::Dropped(reasons.len() as u64))
 }

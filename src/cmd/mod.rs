@@ -15,8 +15,10 @@ mod plan;
 mod pretrain;
 mod render;
 mod settings;
+mod shard;
 mod simulate;
 mod train;
+mod unfinished;
 
 pub use console::{Console, Progress};
 

@@ -28,6 +28,8 @@ pub enum Content {
     Recordings(&'static str),
     /// A directory with the two datasets.
     Datasets,
+    /// A directory of finished pieces, in which other runs may have theirs: nothing in it is replaced.
+    Pieces,
     /// What the command reads as well, and replaces on purpose.
     Own,
     /// Words of the process.
@@ -88,6 +90,7 @@ impl Places {
             match content {
                 Content::Recordings(_) => atomic::check_directory(path, recording::is_file)?,
                 Content::Datasets => atomic::check_directory(path, dataset::is_file)?,
+                Content::Pieces => atomic::check_place(&path.join("a piece"))?,
                 _ => atomic::check_place(path)?,
             }
         }
@@ -160,7 +163,7 @@ fn check_ending(name: &str, path: &Path, content: Content) -> Result<()> {
         Content::Png => ("png", "a PNG picture"),
         Content::Gif => ("gif", "a GIF animation"),
         Content::Log => ("log", "a log"),
-        Content::Recordings(_) | Content::Datasets | Content::Own => return Ok(()),
+        Content::Recordings(_) | Content::Datasets | Content::Pieces | Content::Own => return Ok(()),
     };
     if matches!(atomic::target(path)?, Target::Stream(_)) || path.extension() == Some(OsStr::new(ending)) {
         return Ok(());
@@ -179,7 +182,7 @@ fn check_held(name: &str, path: &Path, content: Content) -> Result<()> {
         Content::Summary(stage) => (Format::Json, Some(stage), None),
         Content::Png => (Format::Png, None, None),
         Content::Gif => (Format::Gif, None, None),
-        Content::Log | Content::Datasets | Content::Own => return Ok(()),
+        Content::Log | Content::Datasets | Content::Pieces | Content::Own => return Ok(()),
         Content::Recordings(stage) => return check_recordings(name, path, stage),
     };
     if is_stream(path) || !path.is_file() {

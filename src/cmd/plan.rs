@@ -1,17 +1,20 @@
 use super::common::{SettingsArgs, path_or};
 use super::places::Content;
+use super::shard::Shard;
+use super::unfinished::{self, Unfinished};
 use super::{Context, Outcome, dropped};
-use crate::config::Stage;
-use crate::data::table_file;
+use crate::config::{Pipeline, Stage};
+use crate::data::{Provenance, table_file};
 use crate::error::{Error, Result};
-use crate::plan::{Planner, to_table};
+use crate::plan::{Block, Plan, Planned, Planner, block_from_table, block_to_table, to_table};
 use crate::seed;
 use crate::tasks::draw_scene;
 use rayon::prelude::*;
-use std::path::PathBuf;
-use std::sync::atomic::{AtomicU64, Ordering};
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::sync::{Mutex, PoisonError};
 
-/// Plan demonstrations: random scenes, and for each a collision-free, smooth joint trajectory.
+/// Plan demonstrations: random scenes, and for each a collision-free, smooth joint trajectory. Stopped, the same command goes on.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     #[command(flatten)]
@@ -22,47 +25,147 @@ pub struct Args {
     /// Parquet file to write [default: runs/<TASK>/plans.parquet]
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
+    /// Do only share I of N, into the directory beside the file, <name>.unfinished; without --shard the shares in there are put together
+    #[arg(long, value_name = "I/N", allow_hyphen_values = true)]
+    shard: Option<Shard>,
 }
-
-/// Samples of all plans together, which stay in memory until they are written: 100,000 plans of the usual length \[control steps\].
-const MOST_SAMPLES: u64 = 15_000_000;
 
 /// For when no scene has a plan.
 const ADVICE: &str = "change the scene (scene.spawn_x_m, scene.spawn_y_m, scene.obstacles) or allow more plan.search_iterations";
 
 pub fn run(args: &Args, context: &Context) -> Result<Outcome> {
     let pipeline = args.settings.resolve(&[("plan.episodes", args.episodes.map(|n| n.to_string()))])?;
-    let (task, seed) = (pipeline.task, args.settings.seed);
-    let out = path_or(args.out.as_deref(), task, "plans.parquet");
-    args.settings.places().write("--out", &out, Content::Table("plan")).check(&context.console)?;
+    let out = path_or(args.out.as_deref(), pipeline.task, "plans.parquet");
+    let kept = unfinished::beside_file(&out)?;
+    if let (Some(shard), None) = (args.shard, &kept) {
+        let out = out.display();
+        return Err(Error::Usage(format!(
+            "--shard {shard}: --out {out} is no file, beside which the share could be kept; name one"
+        )));
+    }
+    let places = args.settings.places().write("--out", &out, Content::Table("plan"));
+    let places =
+        kept.iter().fold(places, |places, kept| places.write("the directory of what is unfinished", kept, Content::Pieces));
+    places.check(&context.console)?;
     let provenance = args.settings.provenance(Stage::Plan, &pipeline, &[])?;
 
-    let progress = context.console.progress("plan", pipeline.plan.episodes, "plans");
-    let all_samples = AtomicU64::new(0);
-    let plans: Vec<dropped::Kept<_>> = (0..pipeline.plan.episodes)
-        .into_par_iter()
-        .map_init(
-            || Planner::new(&pipeline.plan).with_interrupt(&context.interrupt),
-            |planner, index| {
-                context.interrupt.check()?;
-                let scene = draw_scene(task, &pipeline.scene, &mut seed::stream(seed, "plan.scene", index))?;
-                let plan = planner.plan(index, &scene, &mut seed::stream(seed, "plan.search", index));
-                context.interrupt.check()?;
-                let samples = plan.as_ref().map_or(0, |plan| plan.waypoints.len() as u64);
-                if all_samples.fetch_add(samples, Ordering::Relaxed) + samples > MOST_SAMPLES {
-                    return Err(Error::Failed(format!(
-                        "the plans are longer than {MOST_SAMPLES} control steps together; lower plan.episodes, or raise plan.speed or \
-                         plan.max_acceleration_rad_s2"
-                    )));
-                }
-                progress.step();
-                Ok(plan.map_err(|e| format!("episode {index}: {e}")))
-            },
-        )
-        .collect::<Result<_>>()?;
-    progress.finish("");
-    let (plans, outcome) = dropped::keep("plan", plans, ADVICE, &context.console)?;
-    table_file::write(&out, &to_table(&plans), &provenance)?;
+    let blocks: Vec<Block> = Block::all(pipeline.plan.episodes).collect();
+    let share: Vec<Block> = blocks.iter().copied().filter(|b| args.shard.is_none_or(|shard| shard.takes(b.number()))).collect();
+    let origin = |piece: &Path| table_file::read(piece).map(|(_, origin)| origin);
+    let work = Unfinished::begin(kept, &provenance, count(&share), "plan", &context.console, origin)?;
+    let stage = PlanStage { pipeline: &pipeline, seed: args.settings.seed, provenance: &provenance, work: &work, context };
+    let done = stage.plan(&share).and_then(|()| match args.shard {
+        Some(shard) => {
+            work.say_shared(shard);
+            Ok(None)
+        }
+        None => stage.put_together(&out, &blocks).map(Some),
+    });
+    let reasons = match done {
+        Ok(Some(reasons)) => reasons,
+        Ok(None) => return Ok(Outcome::Done),
+        Err(why) => return Err(work.explain(why)),
+    };
+    work.remove()?;
+    let outcome = dropped::say("plan", pipeline.plan.episodes as usize, &reasons, ADVICE, &context.console)?;
     context.console.say(&format!("plan: wrote {}", out.display()));
     Ok(outcome)
+}
+
+/// Episodes of these blocks.
+fn count<'a>(blocks: impl IntoIterator<Item = &'a Block>) -> u64 {
+    blocks.into_iter().map(|block| block.episodes().count() as u64).sum()
+}
+
+/// What all its steps need.
+struct PlanStage<'a> {
+    pipeline: &'a Pipeline,
+    seed: u64,
+    provenance: &'a Provenance,
+    work: &'a Unfinished<'a>,
+    context: &'a Context,
+}
+
+impl PlanStage<'_> {
+    /// Plans what is not there yet. Episodes go to the threads one by one, in order, so that few blocks are under way at any time.
+    fn plan(&self, share: &[Block]) -> Result<()> {
+        let missing = self.missing(share)?;
+        let (all, left) = (count(share), count(&missing));
+        let progress = self.context.console.progress("plan", all, "plans").after(all - left);
+        let begun = Mutex::new(BTreeMap::<Block, Planned>::new());
+        let episodes = missing.iter().flat_map(|block| block.episodes().map(|episode| (*block, episode)));
+        episodes.par_bridge().try_for_each_init(
+            || Planner::new(&self.pipeline.plan).with_interrupt(&self.context.interrupt),
+            |planner, (block, episode)| {
+                let planned = self.plan_one(planner, episode)?;
+                progress.step();
+                let whole = {
+                    let mut begun = begun.lock().unwrap_or_else(PoisonError::into_inner);
+                    let entry = begun.entry(block).or_default();
+                    entry.push((episode, planned));
+                    if entry.len() == block.episodes().count() { begun.remove(&block) } else { None }
+                };
+                whole.map_or(Ok(()), |planned| self.keep(block, planned))
+            },
+        )?;
+        progress.finish("");
+        Ok(())
+    }
+
+    fn plan_one(&self, planner: &mut Planner, episode: u64) -> Result<dropped::Kept<Plan>> {
+        self.context.interrupt.check()?;
+        let mut rng = seed::stream(self.seed, "plan.scene", episode);
+        let scene = draw_scene(self.pipeline.task, &self.pipeline.scene, &mut rng)?;
+        let plan = planner.plan(episode, &scene, &mut seed::stream(self.seed, "plan.search", episode));
+        self.context.interrupt.check()?;
+        Ok(plan.map_err(|e| format!("episode {episode}: {e}")))
+    }
+
+    fn keep(&self, block: Block, mut planned: Planned) -> Result<()> {
+        planned.sort_by_key(|(episode, _)| *episode);
+        let (name, episodes) = (block.file_name(), planned.len() as u64);
+        let bytes = table_file::encode(&self.work.at(&name), &block_to_table(planned), self.provenance)?;
+        self.work.put(&name, &bytes, episodes)
+    }
+
+    /// Says what is there already; returns what is not.
+    fn missing(&self, share: &[Block]) -> Result<Vec<Block>> {
+        let look = |block: &Block| {
+            self.context.interrupt.check()?;
+            let there = self.work.at(&block.file_name()).exists();
+            Ok((*block, there, there && self.read(*block).is_ok()))
+        };
+        let found = share.par_iter().map(look).collect::<Result<Vec<_>>>()?;
+        let whole = count(found.iter().filter(|(.., whole)| *whole).map(|(block, ..)| block));
+        self.work.say_found(whole, found.iter().filter(|(_, there, whole)| *there && !whole).count());
+        Ok(found.into_iter().filter(|(.., whole)| !whole).map(|(block, ..)| block).collect())
+    }
+
+    /// A block that is done.
+    fn read(&self, block: Block) -> Result<Planned> {
+        let path = self.work.at(&block.file_name());
+        let (table, origin) = table_file::read(&path)?;
+        if origin != *self.provenance {
+            return Err(Error::input(&path, "is a piece of another run; remove it"));
+        }
+        block_from_table(block, table).map_err(|why| Error::input(&path, why))
+    }
+
+    /// Writes the plans of all blocks, a block a row group; returns why episodes were dropped.
+    fn put_together(&self, out: &Path, blocks: &[Block]) -> Result<Vec<String>> {
+        let mut reasons = Vec::new();
+        let groups = blocks.iter().filter_map(|block| {
+            let planned = self.context.interrupt.check().and_then(|()| self.read(*block));
+            let plans = planned.map(|planned| split(planned, &mut reasons));
+            plans.map(|plans| (!plans.is_empty()).then(|| to_table(&plans))).transpose()
+        });
+        table_file::write_groups(out, groups, self.provenance)?;
+        Ok(reasons)
+    }
+}
+
+/// The plans; the reasons of the others go to `reasons`.
+fn split(planned: Planned, reasons: &mut Vec<String>) -> Vec<Plan> {
+    let take = |(_, planned): (u64, dropped::Kept<Plan>)| planned.map_err(|reason| reasons.push(reason)).ok();
+    planned.into_iter().filter_map(take).collect()
 }

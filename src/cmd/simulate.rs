@@ -1,19 +1,23 @@
 use super::common::{SettingsArgs, path_or, same_task};
 use super::places::Content;
+use super::shard::Shard;
+use super::unfinished::{self, Unfinished};
 use super::{Context, Outcome};
-use crate::config::Stage;
-use crate::data::{atomic, recording, table_file};
+use crate::config::{SimulateSettings, Stage};
+use crate::data::{Provenance, atomic, recording, table_file};
+use crate::demo::Episode;
 use crate::error::{Error, Result};
-use crate::plan::{Plan, from_table};
+use crate::plan::{Plan, Plans};
 use crate::robot::urdf::urdf;
 use crate::seed;
 use crate::sim::{Disturbance, Follower, run_episode};
 use crate::tasks::FailureClass;
 use rayon::prelude::*;
+use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
 
-/// Execute plans in contact physics, with noise on every command, and record each episode as an MCAP file.
+/// Execute plans in contact physics, with noise on every command, and record each episode as an MCAP file. Stopped, the same command goes on.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     #[command(flatten)]
@@ -27,50 +31,164 @@ pub struct Args {
     /// Directory of recordings to write [default: runs/<TASK>/recordings]
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
+    /// Do only share I of N, into the directory beside the output, <name>.unfinished; without --shard the shares in there are put together
+    #[arg(long, value_name = "I/N", allow_hyphen_values = true)]
+    shard: Option<Shard>,
 }
 
 pub fn run(args: &Args, context: &Context) -> Result<Outcome> {
     let pipeline = args.settings.resolve(&[])?;
     let path = path_or(args.plans.as_deref(), pipeline.task, "plans.parquet");
     let out = path_or(args.out.as_deref(), pipeline.task, "recordings");
-    args.settings.places().read(&path).write("--out", &out, Content::Recordings("simulate")).check(&context.console)?;
-    let (table, made, content) = table_file::read_hashed(&path)?;
-    same_task(&path, made.task, pipeline.task)?;
-    let mut plans = from_table(&table).map_err(|why| Error::input(&path, why))?;
-    plans.truncate(args.episodes.map_or(usize::MAX, |n| n as usize));
-    if plans.is_empty() {
-        return Err(Error::input(&path, "holds no plan; run `hilt plan` again"));
-    }
-    let robot = urdf();
-    let provenance = args.settings.provenance(Stage::Simulate, &pipeline, &[("plans", content)])?;
+    let kept = unfinished::beside_dir(&out)?;
+    let places = args.settings.places().read(&path).write("--out", &out, Content::Recordings("simulate"));
+    places.write("the directory of what is unfinished", &kept, Content::Pieces).check(&context.console)?;
+    let plans = table_file::Reader::open(&path)?;
+    same_task(&path, plans.provenance().task, pipeline.task)?;
+    let mut numbers = check_plans(&path, &plans, context)?;
+    numbers.truncate(args.episodes.map_or(usize::MAX, |n| n as usize));
+    let provenance = args.settings.provenance(Stage::Simulate, &pipeline, &[("plans", plans.content())])?;
 
-    let progress = context.console.progress("simulate", plans.len() as u64, "episodes");
-    let (solved, broken, steps) = (AtomicU64::new(0), AtomicU64::new(0), AtomicU64::new(0));
-    let record = |plan: &Plan, dir: &Path| -> Result<()> {
-        context.interrupt.check()?;
-        let noise = seed::stream(args.settings.seed, "simulate.noise", plan.index);
-        let mut disturbance = Disturbance::new(&pipeline.simulate, noise);
-        let unusable = || Error::input(&path, format!("plan {} has no approach or no carry; run `hilt plan` again", plan.index));
-        let mut follower = Follower::new(plan).ok_or_else(unusable)?;
-        let max_steps = pipeline.simulate.max_steps;
-        let episode = run_episode(plan.index, &plan.scene, &mut follower, &mut disturbance, max_steps, &context.interrupt)?;
-        solved.fetch_add(u64::from(episode.success), Ordering::Relaxed);
-        broken.fetch_add(u64::from(episode.failure == Some(FailureClass::SimulationBrokeDown)), Ordering::Relaxed);
-        steps.fetch_add(episode.steps.len() as u64, Ordering::Relaxed);
-        let file = dir.join(recording::file_name(plan.index));
-        atomic::write_new(&file, &recording::encode(&file, &episode, &robot, &provenance)?)?;
-        progress.step();
-        Ok(())
+    let share: Vec<u64> = numbers.iter().copied().filter(|n| args.shard.is_none_or(|shard| shard.takes(*n))).collect();
+    let origin = |piece: &Path| recording::read(piece).map(|(_, origin)| origin);
+    let work = Unfinished::begin(Some(kept), &provenance, share.len() as u64, "simulate", &context.console, origin)?;
+    let stage = SimulateStage {
+        settings: &pipeline.simulate,
+        seed: args.settings.seed,
+        provenance: &provenance,
+        work: &work,
+        context,
+        totals: Totals::default(),
     };
-    atomic::write_dir(&out, recording::is_file, |dir| plans.par_iter().try_for_each(|plan| record(plan, dir)))?;
-    progress.finish(&format!(", {} control steps, {} solved", steps.into_inner(), solved.into_inner()));
-    let broken = broken.into_inner();
-    if broken > 0 {
-        let keys = "scene.obstacles, scene.friction and scene.block_mass_kg";
-        context
-            .console
-            .say(&format!("simulate: the simulation broke down in {broken} episodes, recorded as failed: look at {keys}"));
+    let done = stage.simulate(&share, Plans::new(&path, plans.tables()?)).and_then(|()| match args.shard {
+        Some(shard) => {
+            work.say_shared(shard);
+            Ok(false)
+        }
+        None => stage.put_together(&out, &numbers).map(|()| true),
+    });
+    match done {
+        Ok(true) => {
+            work.remove()?;
+            context.console.say(&format!("simulate: wrote {}", out.display()));
+            Ok(Outcome::Done)
+        }
+        Ok(false) => Ok(Outcome::Done),
+        Err(why) => Err(work.explain(why)),
     }
-    context.console.say(&format!("simulate: wrote {}", out.display()));
-    Ok(Outcome::Done)
+}
+
+/// Reads all plans before the work begins, so that what cannot be executed is known then; returns their numbers.
+fn check_plans(path: &Path, plans: &table_file::Reader, context: &Context) -> Result<Vec<u64>> {
+    let number = |plan: Result<Plan>| {
+        context.interrupt.check()?;
+        let plan = plan?;
+        follower(path, &plan).map(|_| plan.index)
+    };
+    let numbers = Plans::new(path, plans.tables()?).map(number).collect::<Result<Vec<_>>>()?;
+    if numbers.is_empty() {
+        return Err(Error::input(path, "holds no plan; run `hilt plan` again"));
+    }
+    Ok(numbers)
+}
+
+fn follower(path: &Path, plan: &Plan) -> Result<Follower> {
+    let unusable = || Error::input(path, format!("plan {} has no approach or no carry; run `hilt plan` again", plan.index));
+    Follower::new(plan).ok_or_else(unusable)
+}
+
+/// What is said of all episodes in the end.
+#[derive(Default)]
+struct Totals {
+    solved: AtomicU64,
+    broken: AtomicU64,
+    steps: AtomicU64,
+}
+
+impl Totals {
+    fn add(&self, episode: &Episode) {
+        self.solved.fetch_add(u64::from(episode.success), Ordering::Relaxed);
+        self.broken.fetch_add(u64::from(episode.failure == Some(FailureClass::SimulationBrokeDown)), Ordering::Relaxed);
+        self.steps.fetch_add(episode.steps.len() as u64, Ordering::Relaxed);
+    }
+}
+
+/// What all its steps need.
+struct SimulateStage<'a> {
+    settings: &'a SimulateSettings,
+    seed: u64,
+    provenance: &'a Provenance,
+    work: &'a Unfinished<'a>,
+    context: &'a Context,
+    totals: Totals,
+}
+
+impl SimulateStage<'_> {
+    /// Executes the plans of this share that are not recorded yet.
+    fn simulate(&self, share: &[u64], plans: impl Iterator<Item = Result<Plan>> + Send) -> Result<()> {
+        let done = self.done(share)?;
+        let progress = self.context.console.progress("simulate", share.len() as u64, "episodes").after(done.len() as u64);
+        let missing: HashSet<u64> = share.iter().copied().filter(|number| !done.contains(number)).collect();
+        let robot = urdf();
+        // One by one, in order: the plans are in memory a few at a time.
+        let wanted = plans.filter(|plan| plan.as_ref().map_or(true, |plan| missing.contains(&plan.index)));
+        wanted.par_bridge().try_for_each(|plan| {
+            self.record(&plan?, &robot)?;
+            progress.step();
+            Ok(())
+        })?;
+        let Totals { solved, broken, steps } = &self.totals;
+        let [solved, broken, steps] = [solved, broken, steps].map(|total| total.load(Ordering::Relaxed));
+        progress.finish(&format!(", {steps} control steps, {solved} solved"));
+        if broken > 0 {
+            let keys = "scene.obstacles, scene.friction and scene.block_mass_kg";
+            self.context
+                .console
+                .say(&format!("simulate: the simulation broke down in {broken} episodes, recorded as failed: look at {keys}"));
+        }
+        Ok(())
+    }
+
+    fn record(&self, plan: &Plan, robot: &str) -> Result<()> {
+        let interrupt = &self.context.interrupt;
+        interrupt.check()?;
+        let name = recording::file_name(plan.index);
+        let noise = seed::stream(self.seed, "simulate.noise", plan.index);
+        let mut disturbance = Disturbance::new(self.settings, noise);
+        let mut follower = follower(&self.work.at(&name), plan)?;
+        let episode = run_episode(plan.index, &plan.scene, &mut follower, &mut disturbance, self.settings.max_steps, interrupt)?;
+        self.totals.add(&episode);
+        self.work.put(&name, &recording::encode(&self.work.at(&name), &episode, robot, self.provenance)?, 1)
+    }
+
+    /// The episodes of this share that are recorded already; says how many.
+    fn done(&self, share: &[u64]) -> Result<HashSet<u64>> {
+        let files = recording::files(self.work.dir())?;
+        let there: HashSet<u64> = files.iter().filter_map(|file| recording::number_of(file.file_name()?.to_str()?)).collect();
+        let there: Vec<u64> = share.iter().copied().filter(|number| there.contains(number)).collect();
+        let look = |number: &u64| {
+            self.context.interrupt.check()?;
+            let whole = recording::read(&self.work.at(&recording::file_name(*number))).ok();
+            let whole = whole.filter(|(episode, origin)| episode.index == *number && *origin == *self.provenance);
+            Ok(whole.map(|(episode, _)| {
+                self.totals.add(&episode);
+                *number
+            }))
+        };
+        let whole: Vec<Option<u64>> = there.par_iter().map(look).collect::<Result<_>>()?;
+        let whole: HashSet<u64> = whole.into_iter().flatten().collect();
+        self.work.say_found(whole.len() as u64, there.len() - whole.len());
+        Ok(whole)
+    }
+
+    /// Puts the recordings into their directory. They stay among the pieces until it is in place.
+    fn put_together(&self, out: &Path, numbers: &[u64]) -> Result<()> {
+        atomic::write_dir(out, recording::is_file, |dir| {
+            numbers.iter().try_for_each(|number| {
+                self.context.interrupt.check()?;
+                let name = recording::file_name(*number);
+                atomic::link(&self.work.at(&name), &dir.join(&name))
+            })
+        })
+    }
 }

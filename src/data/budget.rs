@@ -17,8 +17,8 @@ impl Budget {
     }
 
     /// Adds what a file of `bytes` bytes may unpack to.
-    pub(super) fn allow_for(&mut self, bytes: usize) {
-        self.left = self.left.saturating_add(bytes as u64 * BYTES_PER_BYTE);
+    pub(super) fn allow_for(&mut self, bytes: u64) {
+        self.left = self.left.saturating_add(bytes.saturating_mul(BYTES_PER_BYTE));
     }
 
     /// Takes `bytes`.

@@ -5,7 +5,7 @@ use crate::error::{Error, Result};
 use crate::interrupt;
 use std::borrow::Cow;
 use std::fs::File;
-use std::io::{ErrorKind, Read};
+use std::io::{ErrorKind, Read, Write};
 use std::os::unix::fs::FileExt;
 use std::path::Path;
 
@@ -51,6 +51,28 @@ impl Format {
         let rest = self.most_bytes + 1 - bytes.len() as u64;
         file.take(rest).read_to_end(&mut bytes).map_err(unreadable)?;
         Ok(bytes)
+    }
+
+    /// A file that looks like one of the format, to be read in parts, and its length. What is no regular file (a pipe) is copied to the disk.
+    ///
+    /// # Errors
+    /// As [`Format::read`].
+    pub(super) fn open(&self, path: &Path) -> Result<(File, u64)> {
+        let _waits = interrupt::waiting();
+        let unreadable = |e| Error::io(path, "read", e);
+        let mut file = File::open(path).map_err(unreadable)?;
+        if !file.metadata().map_err(unreadable)?.is_file() {
+            let mut head = Vec::new();
+            (&mut file).take(HEAD_BYTES as u64).read_to_end(&mut head).map_err(unreadable)?;
+            self.check_head(path, &head)?;
+            let mut copy = tempfile::tempfile().map_err(unreadable)?;
+            let copied = copy.write_all(&head).and_then(|()| std::io::copy(&mut file.take(self.most_bytes), &mut copy));
+            copied.map_err(unreadable)?;
+            file = copy;
+        }
+        let len = file.metadata().map_err(unreadable)?.len();
+        self.check_ends(path, &Ends::OfFile(&file, len))?;
+        Ok((file, len))
     }
 
     /// The same checks of bytes that have been read.

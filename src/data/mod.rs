@@ -13,6 +13,7 @@ mod json_text;
 mod litter;
 mod parquet_file;
 mod parquet_limits;
+mod parquet_stream;
 pub mod peek;
 mod proto;
 pub mod provenance;

@@ -14,6 +14,9 @@ use parquet::errors::ParquetError;
 use parquet::file::metadata::KeyValue;
 use parquet::file::properties::WriterProperties;
 use prost::bytes::Bytes;
+use std::fs::File;
+use std::io::{self, Write};
+use std::os::unix::fs::FileExt;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -22,14 +25,35 @@ const CREATED_BY: &str = concat!("hilt version ", env!("CARGO_PKG_VERSION"));
 /// Metadata key of the seal.
 const SEAL_KEY: &str = "hilt.seal";
 
-/// A Parquet file in memory that grows by batches.
-pub(super) struct Writer {
-    writer: ArrowWriter<Vec<u8>>,
+/// A Parquet file that grows by batches, in memory or on the disk.
+pub(super) struct Writer<W: Write + Send = Vec<u8>> {
+    writer: ArrowWriter<W>,
 }
 
 impl Writer {
-    /// A file of `schema`, with `provenance` in the metadata of the Arrow schema (where pyarrow looks) and of the file.
+    /// As [`Writer::to`], in memory.
     pub(super) fn new(schema: &Schema, provenance: &Provenance) -> std::result::Result<Self, ParquetError> {
+        Writer::to(Vec::new(), schema, provenance)
+    }
+
+    /// The whole file, sealed.
+    pub(super) fn finish(self) -> std::result::Result<Vec<u8>, ParquetError> {
+        Ok(seal::close(self.writer.into_inner()?))
+    }
+}
+
+impl Writer<&mut File> {
+    /// Ends the file and seals it.
+    pub(super) fn finish_file(self) -> std::result::Result<(), ParquetError> {
+        let file = self.writer.into_inner()?;
+        let tail = tail_bytes(file)?;
+        Ok(seal::close_file(file, tail)?)
+    }
+}
+
+impl<W: Write + Send> Writer<W> {
+    /// A file of `schema`, with `provenance` in the metadata of the Arrow schema (where pyarrow looks) and of the file.
+    pub(super) fn to(to: W, schema: &Schema, provenance: &Provenance) -> std::result::Result<Self, ParquetError> {
         let json = provenance.to_json();
         let mut metadata = schema.metadata().clone();
         metadata.insert(provenance::KEY, json.clone());
@@ -40,7 +64,7 @@ impl Writer {
             .set_compression(Compression::ZSTD(ZstdLevel::default()))
             .set_key_value_metadata(Some(vec![entry(provenance::KEY, json), entry(SEAL_KEY, seal::blank())]))
             .build();
-        Ok(Writer { writer: ArrowWriter::try_new(Vec::new(), schema, Some(properties))? })
+        Ok(Writer { writer: ArrowWriter::try_new(to, schema, Some(properties))? })
     }
 
     /// Adds a batch as its own row group.
@@ -52,11 +76,6 @@ impl Writer {
     /// Bytes so far.
     pub(super) fn len(&self) -> usize {
         self.writer.bytes_written()
-    }
-
-    /// The whole file, sealed.
-    pub(super) fn finish(self) -> std::result::Result<Vec<u8>, ParquetError> {
-        Ok(seal::close(self.writer.into_inner()?))
     }
 }
 
@@ -75,14 +94,17 @@ pub(super) fn cannot_encode(path: &Path, error: impl std::fmt::Display) -> Error
 /// What our Parquet files look like from outside.
 pub(super) const FORMAT: Format = Format {
     most_bytes: 4 << 30,
-    reason: "100,000 plans have some 800 MB, and a file of a dataset is closed at 100 MB",
+    reason: "a file of a dataset is closed at 100 MB, and a table that is read as a whole has some kilobytes",
     head: check_head,
     ends: check_ends,
 };
+/// The same of a file that is read in parts.
+pub(super) const LONG: Format =
+    Format { most_bytes: 100 << 30, reason: "100,000 plans of 10,000 steps, the most there can be, have some 80 GB", ..FORMAT };
 /// The format's name, at either end of a file.
 const MAGIC: &[u8] = b"PAR1";
 /// Who wrote a file is said behind its columns, at the end of its metadata.
-const WRITER_WITHIN: usize = 4096;
+pub(super) const WRITER_WITHIN: usize = 4096;
 
 fn check_head(path: &Path, head: &[u8]) -> Result<()> {
     if head.starts_with(MAGIC) {
@@ -100,8 +122,15 @@ fn check_ends(path: &Path, ends: &Ends) -> Result<()> {
 
 /// Whether this is a Parquet file that another program wrote (or rewrote).
 pub(super) fn is_foreign(bytes: &[u8]) -> bool {
-    let tail = &bytes[bytes.len().saturating_sub(WRITER_WITHIN)..];
-    bytes.starts_with(MAGIC) && bytes.ends_with(MAGIC) && seal::find_last(tail, CREATED_BY.as_bytes()).is_none()
+    bytes.starts_with(MAGIC) && bytes.ends_with(MAGIC) && ends_as_foreign(bytes)
+}
+
+pub(super) fn ends_as_foreign(bytes: &[u8]) -> bool {
+    seal::find_last(&bytes[bytes.len().saturating_sub(WRITER_WITHIN)..], CREATED_BY.as_bytes()).is_none()
+}
+
+pub(super) fn foreign(path: &Path) -> Error {
+    Error::input(path, "was written by another program than hilt; run the stage that makes it again")
 }
 
 /// Checks the seal, then decodes.
@@ -111,11 +140,18 @@ pub(super) fn is_foreign(bytes: &[u8]) -> bool {
 pub(super) fn open(path: &Path, bytes: Vec<u8>) -> Result<(SchemaRef, Vec<RecordBatch>)> {
     FORMAT.check(path, &bytes)?;
     if is_foreign(&bytes) {
-        return Err(Error::input(path, "was written by another program than hilt; run the stage that makes it again"));
+        return Err(foreign(path));
     }
     seal::check(path, &bytes)?;
-    decode(bytes).map_err(|e| Error::input(path, format!("cannot be decoded: {e}")))
+    decode(bytes).map_err(|e| cannot_decode(path, &e))
 }
+
+pub(super) fn cannot_decode(path: &Path, why: &str) -> Error {
+    Error::input(path, format!("cannot be decoded: {why}"))
+}
+
+/// The panic of a decoder, in words.
+pub(super) const BROKEN: &str = "its inner structure is broken";
 
 /// Rows that are decoded at once, where they are short.
 const ROWS_AT_ONCE: usize = 8192;
@@ -125,9 +161,9 @@ const TEXTS_AT_ONCE: usize = 64 << 20;
 /// All batches of a Parquet file, as long as they are no larger than its size allows.
 pub(super) fn decode(bytes: Vec<u8>) -> std::result::Result<(SchemaRef, Vec<RecordBatch>), String> {
     let longest_text = parquet_limits::check(&bytes)?;
-    let rows = (TEXTS_AT_ONCE / longest_text.max(1)).clamp(1, ROWS_AT_ONCE);
+    let rows = rows_at_once(longest_text);
     let mut budget = Budget::new();
-    budget.allow_for(bytes.len());
+    budget.allow_for(bytes.len() as u64);
     guarded(|| {
         let builder = ParquetRecordBatchReaderBuilder::try_new(Bytes::from(bytes)).map_err(|e| e.to_string())?;
         let schema = Arc::clone(builder.schema());
@@ -140,8 +176,23 @@ pub(super) fn decode(bytes: Vec<u8>) -> std::result::Result<(SchemaRef, Vec<Reco
         }
         Ok((schema, batches))
     })
-    .unwrap_or_else(|_| Err("its inner structure is broken".into()))
+    .unwrap_or_else(|_| Err(BROKEN.into()))
 }
+
+pub(super) fn rows_at_once(longest_text: usize) -> usize {
+    (TEXTS_AT_ONCE / longest_text.max(1)).clamp(1, ROWS_AT_ONCE)
+}
+
+/// Bytes at the end of a file that hold its seal: the metadata, and what follows them.
+pub(super) fn tail_bytes(file: &File) -> io::Result<u64> {
+    let mut tail = [0; (size_of::<u32>() + MAGIC.len())];
+    let len = tail.len() as u64;
+    file.read_exact_at(&mut tail, file.metadata()?.len().saturating_sub(len))?;
+    Ok((parquet_limits::metadata_bytes(&tail) + len).min(MOST_PART_BYTES))
+}
+
+/// No column of a row group and no metadata that are read at once are longer: those of 100,000 plans have 12 MB.
+pub(super) const MOST_PART_BYTES: u64 = 256 << 20;
 
 /// The provenance in a schema's metadata.
 pub(super) fn provenance_of(path: &Path, schema: &Schema) -> Result<Provenance> {

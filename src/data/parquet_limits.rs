@@ -2,9 +2,10 @@
 
 use super::budget::Budget;
 use super::thrift::{Value, walk};
+use std::borrow::Cow;
 
 /// Bytes at the end of a file: the metadata's length and the format's name.
-const TAIL: usize = 8;
+const TAIL: u64 = 8;
 /// Entries of a schema, groups included; hilt's widest has some 200, and decoders descend into groups by recursion.
 const MOST_SCHEMA_ENTRIES: usize = 1000;
 /// Numbers of a row in one column; hilt's longest list has 32.
@@ -45,17 +46,28 @@ struct Chunk {
     dictionary_page: Option<i64>,
 }
 
+/// Gives so many bytes of a file from a place on; both are within its length.
+pub(super) type Part<'a> = dyn Fn(u64, u64) -> Result<Cow<'a, [u8]>, String> + 'a;
+
 /// Checks metadata and page headers of a whole file; returns the unpacked bytes of the largest page of texts: one value can be as long.
 ///
 /// # Errors
 /// Says what does not fit, or is too large.
 pub(super) fn check(bytes: &[u8]) -> Result<usize, String> {
-    let end = bytes.len().checked_sub(TAIL).ok_or("it is shorter than its metadata")?;
-    let length = bytes[end..].first_chunk().map_or(0, |length| u32::from_le_bytes(*length)) as usize;
+    check_parts(bytes.len() as u64, &|from, len| Ok(Cow::Borrowed(&bytes[from as usize..(from + len) as usize])))
+}
+
+/// As [`check`], of a file of `len` bytes that is looked at in parts.
+///
+/// # Errors
+/// As [`check`]; what `part` says.
+pub(super) fn check_parts(len: u64, part: &Part) -> Result<usize, String> {
+    let end = len.checked_sub(TAIL).ok_or("it is shorter than its metadata")?;
+    let length = metadata_bytes(&part(end, TAIL)?);
     let start = end.checked_sub(length).ok_or_else(|| format!("its metadata would have {length} bytes, the file has {end}"))?;
-    let (chunks, rows) = columns(&bytes[start..end])?;
+    let (chunks, rows) = columns(&part(start, length)?)?;
     let mut budget = Budget::new();
-    budget.allow_for(bytes.len());
+    budget.allow_for(len);
     let mut longest_text = 0;
     for chunk in &chunks {
         let most = rows.get(chunk.group).copied().unwrap_or(0).saturating_mul(MOST_VALUES_OF_A_ROW);
@@ -63,12 +75,18 @@ pub(super) fn check(bytes: &[u8]) -> Result<usize, String> {
             return Err(format!("a column has {} values, its rows can have at most {most}", chunk.values));
         }
         budget.take(chunk.values.unsigned_abs().saturating_mul(BYTES_OF_A_VALUE))?;
-        let largest = pages(&bytes[..start], chunk, &mut budget)?;
+        let (from, packed) = chunk.place(start)?;
+        let largest = pages(&part(from, packed)?, chunk, &mut budget)?;
         if chunk.physical_type == BYTE_ARRAY {
             longest_text = longest_text.max(largest);
         }
     }
     Ok(longest_text)
+}
+
+/// Bytes of the metadata by the end of a file, its last eight bytes.
+pub(super) fn metadata_bytes(tail: &[u8]) -> u64 {
+    tail.first_chunk().map_or(0, |length| u64::from(u32::from_le_bytes(*length)))
 }
 
 /// The columns of all row groups, and the rows of each group.
@@ -105,15 +123,19 @@ impl Chunk {
             _ => {}
         }
     }
+
+    /// Where the column begins in the data, which have `len` bytes, and its length.
+    fn place(&self, len: u64) -> Result<(u64, u64), String> {
+        let start = self.dictionary_page.filter(|at| *at > 0).map_or(self.data_page, |at| at.min(self.data_page));
+        let place = (u64::try_from(start).ok()).zip(u64::try_from(self.packed).ok());
+        place
+            .filter(|(from, packed)| from.checked_add(*packed).is_some_and(|to| to <= len))
+            .ok_or_else(|| format!("a column lies at byte {start} and has {} bytes, the data has {len}", self.packed))
+    }
 }
 
 /// Walks the pages of a column; returns the unpacked bytes of the largest.
-fn pages(bytes: &[u8], chunk: &Chunk, budget: &mut Budget) -> Result<usize, String> {
-    let start = chunk.dictionary_page.filter(|at| *at > 0).map_or(chunk.data_page, |at| at.min(chunk.data_page));
-    let outside = || format!("a column lies at byte {start} and has {} bytes, the data has {}", chunk.packed, bytes.len());
-    let from = usize::try_from(start).map_err(|_| outside())?;
-    let to = usize::try_from(chunk.packed).ok().and_then(|packed| from.checked_add(packed));
-    let mut left = to.and_then(|to| bytes.get(from..to)).ok_or_else(outside)?;
+fn pages(mut left: &[u8], chunk: &Chunk, budget: &mut Budget) -> Result<usize, String> {
     let mut largest = 0;
     while !left.is_empty() {
         let (mut unpacked, mut packed, mut values) = (0, 0, 0);

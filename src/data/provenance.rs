@@ -81,7 +81,7 @@ impl Provenance {
 
 /// What names bytes, wherever they are: their BLAKE3 hash, hexadecimal as text.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct ContentHash(blake3::Hash);
+pub struct ContentHash(pub(super) blake3::Hash);
 
 impl ContentHash {
     /// Of the bytes of a file.

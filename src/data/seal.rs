@@ -1,15 +1,20 @@
 //! A seal: the BLAKE3 hash of a file, kept inside that file. It is computed over all bytes with the 64 digits of the hash itself
 //! set to zero, so any changed bit is found before a decoder sees the file.
 
-use super::provenance::SCHEMA_VERSION;
+use super::provenance::{ContentHash, SCHEMA_VERSION};
 use crate::error::{Error, Result};
+use std::fs::File;
+use std::io::{self, ErrorKind};
 use std::ops::Range;
+use std::os::unix::fs::FileExt;
 use std::path::Path;
 
 /// What stands before the 64 hexadecimal digits.
 const MARK: &str = "hilt-seal-blake3:";
 /// Hexadecimal digits of a BLAKE3 hash.
 const DIGITS: usize = 64;
+/// Bytes of a long file that are hashed at once.
+const PART_BYTES: usize = 1 << 20;
 /// The field that versions of hilt agree on.
 const VERSION_FIELD: &[u8] = b"schema_version";
 
@@ -51,12 +56,7 @@ pub fn check(path: &Path, bytes: &[u8]) -> Result<()> {
 /// # Errors
 /// As [`check`].
 pub(super) fn check_but(path: &Path, bytes: &[u8], later: Range<usize>) -> Result<()> {
-    let Some(at) = digits_at(bytes) else {
-        return Err(Error::input(
-            path,
-            "no hilt seal found: the file is cut short or another program wrote it; run the stage that makes it again",
-        ));
-    };
+    let at = digits_at(bytes).ok_or_else(|| missing(path))?;
     let digits = at..at + DIGITS;
     let mut hash = blake3::Hasher::new();
     hash.update(&bytes[..at]).update("0".repeat(DIGITS).as_bytes());
@@ -64,16 +64,77 @@ pub(super) fn check_but(path: &Path, bytes: &[u8], later: Range<usize>) -> Resul
         Some(between) => hash.update(between).update(&vec![0; later.len()]).update(&bytes[later.end..]),
         None => hash.update(&bytes[digits.end..]),
     };
-    if bytes[digits] == *hash.finalize().to_hex().as_bytes() {
-        return Ok(());
-    }
-    match foreign_version(bytes) {
-        Some(version) => Err(wrong_version(path, version)),
-        None => Err(Error::input(
+    if bytes[digits] == *hash.finalize().to_hex().as_bytes() { Ok(()) } else { Err(broken(path, bytes)) }
+}
+
+fn missing(path: &Path) -> Error {
+    let message = "no hilt seal found: the file is cut short or another program wrote it; run the stage that makes it again";
+    Error::input(path, message)
+}
+
+/// The error for a file whose seal does not hold; `tail` is its end, or all of it.
+fn broken(path: &Path, tail: &[u8]) -> Error {
+    match foreign_version(tail) {
+        Some(version) => wrong_version(path, version),
+        None => Error::input(
             path,
             "damaged, or rewritten by another program: its content does not match its seal (a changed, missing or added byte); run \
              the stage that makes it again",
-        )),
+        ),
+    }
+}
+
+/// As [`close`], of a file on the disk that need not fit into memory; its seal is blank and stands in its last `tail` bytes.
+///
+/// # Errors
+/// What the system says.
+pub(super) fn close_file(file: &File, tail: u64) -> io::Result<()> {
+    let (from, tail) = tail_of(file, tail)?;
+    let at = from + digits_at(&tail).ok_or(ErrorKind::InvalidData)? as u64;
+    let (_, sealed) = hashes(file, at)?;
+    file.write_all_at(sealed.to_hex().as_bytes(), at)
+}
+
+/// As [`check`], of a file on the disk whose seal stands in its last `tail` bytes; returns the hash of all its bytes.
+///
+/// # Errors
+/// As [`check`]; [`Error::Io`] when it cannot be read.
+pub(super) fn check_file(path: &Path, file: &File, tail: u64) -> Result<ContentHash> {
+    let unreadable = |e| Error::io(path, "read", e);
+    let (from, tail) = tail_of(file, tail).map_err(unreadable)?;
+    let at = digits_at(&tail).ok_or_else(|| missing(path))?;
+    let (content, sealed) = hashes(file, from + at as u64).map_err(unreadable)?;
+    if tail[at..at + DIGITS] == *sealed.to_hex().as_bytes() { Ok(ContentHash(content)) } else { Err(broken(path, &tail)) }
+}
+
+/// The last `tail` bytes of a file, and where they begin.
+fn tail_of(file: &File, tail: u64) -> io::Result<(u64, Vec<u8>)> {
+    let len = file.metadata()?.len();
+    let from = len.saturating_sub(tail);
+    let mut bytes = vec![0; (len - from) as usize];
+    file.read_exact_at(&mut bytes, from)?;
+    Ok((from, bytes))
+}
+
+/// The hash of a file's bytes, and the one with zeros for the digits at `digits`.
+fn hashes(file: &File, digits: u64) -> io::Result<(blake3::Hash, blake3::Hash)> {
+    let (mut content, mut sealed) = (blake3::Hasher::new(), blake3::Hasher::new());
+    let (mut part, mut at) = (vec![0; PART_BYTES], 0);
+    loop {
+        // A part ends where the digits begin, and where they end.
+        let border = [digits, digits + DIGITS as u64].into_iter().find(|border| *border > at).unwrap_or(u64::MAX);
+        let most = usize::try_from(border - at).map_or(PART_BYTES, |most| most.min(PART_BYTES));
+        let read = match file.read_at(&mut part[..most], at) {
+            Ok(0) => return Ok((content.finalize(), sealed.finalize())),
+            Err(e) if e.kind() == ErrorKind::Interrupted => continue,
+            read => read?,
+        };
+        content.update(&part[..read]);
+        if (digits..digits + DIGITS as u64).contains(&at) {
+            part[..read].fill(b'0');
+        }
+        sealed.update(&part[..read]);
+        at += read as u64;
     }
 }
 
@@ -121,6 +182,25 @@ mod tests {
                 assert!(check(path, &bytes).is_err(), "byte {at} bit {bit}");
             }
             assert!(check(path, &whole[..at]).is_err(), "cut at {at}");
+        }
+    }
+
+    #[test]
+    fn a_long_file_is_sealed_and_checked_as_its_bytes_are() {
+        let text = |len: usize| format!("{}{}, and a tail", "ab".repeat(len), blank()).into_bytes();
+        let (path, tail) = (Path::new("file"), 200);
+        for len in [10, PART_BYTES / 2 - 40, PART_BYTES / 2, 2 * PART_BYTES + 7] {
+            let file = tempfile::tempfile().expect("a file");
+            file.write_all_at(&text(len), 0).expect("written");
+            close_file(&file, tail).expect("sealed");
+            let bytes = tail_of(&file, u64::MAX).expect("read").1;
+            assert!(bytes == close(text(len)), "{len}");
+            assert_eq!(check_file(path, &file, tail).expect("whole"), ContentHash::of(&bytes));
+            for at in [0, bytes.len() / 2, bytes.len() - 60, bytes.len() - 1] {
+                file.write_all_at(&[bytes[at] ^ 1], at as u64).expect("written");
+                assert!(check_file(path, &file, tail).is_err(), "{len}: byte {at}");
+                file.write_all_at(&[bytes[at]], at as u64).expect("written");
+            }
         }
     }
 

@@ -1,5 +1,6 @@
 //! Tables (plans, metrics, evaluation logs) as Parquet; every column carries its description and unit in its own metadata.
 
+use super::parquet_stream::Stream;
 use super::{ContentHash, Provenance, atomic, parquet_file};
 use crate::error::{Error, Result};
 use crate::table::{Column, Table, Values};
@@ -9,7 +10,7 @@ use arrow_array::{
     Array, ArrayRef, ArrowPrimitiveType, BooleanArray, Float32Array, Float64Array, Int64Array, RecordBatch, StringArray,
 };
 use arrow_schema::{ArrowError, DataType, Field, Schema};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 /// Field metadata: what the column is.
@@ -47,11 +48,34 @@ pub fn write(path: &Path, table: &Table, provenance: &Provenance) -> Result<()> 
     atomic::write_bytes(path, &encode(path, table, provenance)?)
 }
 
+/// Writes a table that need not fit into memory: its rows come in `groups` with the same columns, each of which becomes a row group.
+/// Without any nothing is written.
+///
+/// # Errors
+/// As [`write()`]; an error among the groups.
+pub fn write_groups(path: &Path, mut groups: impl Iterator<Item = Result<Table>>, provenance: &Provenance) -> Result<()> {
+    let Some(first) = groups.next().transpose()? else { return Ok(()) };
+    let cannot = |e| parquet_file::cannot_encode(path, e);
+    let first = checked_batch(path, &first)?;
+    atomic::write_with(path, |file| {
+        let mut writer = parquet_file::Writer::to(file, &first.schema(), provenance).map_err(cannot)?;
+        writer.row_group(&first).map_err(cannot)?;
+        for group in groups {
+            writer.row_group(&checked_batch(path, &group?)?).map_err(cannot)?;
+        }
+        writer.finish_file().map_err(cannot)
+    })
+}
+
 /// The bytes of the file that [`write()`] writes to `path`.
 ///
 /// # Errors
 /// [`Error::Input`] when the columns differ in length or share a name.
 pub fn encode(path: &Path, table: &Table, provenance: &Provenance) -> Result<Vec<u8>> {
+    parquet_file::of_batch(&checked_batch(path, table)?, provenance).map_err(|e| parquet_file::cannot_encode(path, e))
+}
+
+fn checked_batch(path: &Path, table: &Table) -> Result<RecordBatch> {
     for (i, column) in table.columns.iter().enumerate() {
         if column.values.len() != table.rows() {
             let message = format!("column {} has {} rows, the first has {}", column.name, column.values.len(), table.rows());
@@ -61,8 +85,7 @@ pub fn encode(path: &Path, table: &Table, provenance: &Provenance) -> Result<Vec
             return Err(Error::input(path, format!("two columns are named {}", column.name)));
         }
     }
-    let batch = to_batch(table).map_err(|e| parquet_file::cannot_encode(path, e))?;
-    parquet_file::of_batch(&batch, provenance).map_err(|e| parquet_file::cannot_encode(path, e))
+    to_batch(table).map_err(|e| parquet_file::cannot_encode(path, e))
 }
 
 /// Reads what [`write()`] wrote.
@@ -87,6 +110,10 @@ pub fn read_hashed(path: &Path) -> Result<(Table, Provenance, ContentHash)> {
 fn decode(path: &Path, bytes: Vec<u8>) -> Result<(Table, Provenance)> {
     let (schema, batches) = parquet_file::open(path, bytes)?;
     let provenance = parquet_file::provenance_of(path, &schema)?;
+    Ok((of_batches(path, &schema, &batches)?, provenance))
+}
+
+fn of_batches(path: &Path, schema: &Schema, batches: &[RecordBatch]) -> Result<Table> {
     let mut table = Table::default();
     for (i, field) in schema.fields().iter().enumerate() {
         let values =
@@ -94,7 +121,45 @@ fn decode(path: &Path, bytes: Vec<u8>) -> Result<(Table, Provenance)> {
         let doc = field.metadata().get(DOC).map(|d| d.to_string()).unwrap_or_default();
         table.columns.push(Column { name: field.name().clone(), doc, values });
     }
-    Ok((table, provenance))
+    Ok(table)
+}
+
+/// A table that is read in pieces of some thousand rows, as often as wanted.
+pub struct Reader {
+    path: PathBuf,
+    stream: Stream,
+    provenance: Provenance,
+}
+
+impl Reader {
+    /// Checks a file that [`write()`] or [`write_groups`] wrote.
+    ///
+    /// # Errors
+    /// As [`read`].
+    pub fn open(path: &Path) -> Result<Self> {
+        let stream = Stream::open(path)?;
+        let provenance = parquet_file::provenance_of(path, stream.schema())?;
+        Ok(Reader { path: path.to_path_buf(), stream, provenance })
+    }
+
+    /// What the file carries of its origin.
+    pub fn provenance(&self) -> &Provenance {
+        &self.provenance
+    }
+
+    /// The hash of the file's bytes.
+    pub fn content(&self) -> ContentHash {
+        self.stream.content
+    }
+
+    /// All rows, one piece of the table after another. One pass at a time.
+    ///
+    /// # Errors
+    /// As [`read`]; the items have those of what is read late.
+    pub fn tables(&self) -> Result<impl Iterator<Item = Result<Table>> + Send> {
+        let batches = self.stream.batches(&self.path)?;
+        Ok(batches.map(|batch| batch.and_then(|batch| of_batches(&self.path, &batch.schema(), &[batch]))))
+    }
 }
 
 fn no_table(field: &Field) -> String {

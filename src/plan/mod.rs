@@ -3,6 +3,7 @@
 //! Demonstrations have low entropy on purpose: one grasp, one branch of the wrist, straight lines with rounded corners; a search only where
 //! something stands in the way.
 
+mod block;
 mod collision;
 mod grasp;
 mod path;
@@ -14,10 +15,11 @@ mod timing;
 mod transit;
 mod world;
 
+pub use block::{Block, Planned, block_from_table, block_to_table};
 pub use grasp::{GRASP_OVER_CENTER_M, LIFTED_CENTER_M, RELEASE_GAP_M};
 pub use planner::Planner;
 pub use smooth::Limits;
-pub use table::{from_table, to_table};
+pub use table::{Plans, from_table, to_table};
 pub use world::{CLEARANCE_M, RESOLUTION_M, check_ready_pose};
 
 use crate::demo::Phase;

@@ -3,10 +3,12 @@
 use super::{Plan, Waypoint};
 use crate::config::{MOST_STEPS, check_scene};
 use crate::demo::{LARGEST_NUMBER, Phase};
+use crate::error::Error;
 use crate::scene::Scene;
 use crate::state::{JOINT_NAMES, JOINTS};
 use crate::table::{Table, Values};
 use std::collections::HashSet;
+use std::path::{Path, PathBuf};
 
 /// Plans as a table, one row per waypoint: `episode`, `step`, `phase`, `<joint>.q_rad` and `<joint>.dq_rad_s` per joint, and `scene`, the scene
 /// as JSON on the first row of each episode (empty text on the others).
@@ -40,53 +42,116 @@ pub fn to_table(plans: &[Plan]) -> Table {
 /// Says which column is missing or of another type, and in which row a number is not finite, a phase unknown, a scene unreadable, or the
 /// order of episodes, steps or phases broken.
 pub fn from_table(table: &Table) -> Result<Vec<Plan>, String> {
-    let (episodes, steps) = (integers(table, "episode")?, integers(table, "step")?);
-    let (phases, scenes) = (texts(table, "phase")?, texts(table, "scene")?);
-    let joints =
-        |suffix: &str| JOINT_NAMES.iter().map(|j| floats(table, &format!("{j}.{suffix}"))).collect::<Result<Vec<_>, _>>();
-    let (q, dq) = (joints("q_rad")?, joints("dq_rad_s")?);
-    let rows = episodes.len();
-    if let Some(c) = table.columns.iter().find(|c| c.values.len() != rows) {
-        return Err(format!("column {} has {} rows, episode has {rows}", c.name, c.values.len()));
-    }
-    let (mut plans, mut begun) = (Vec::<Plan>::new(), HashSet::new());
-    for row in 0..rows {
-        let at = |what: String| format!("row {row}: {what}");
-        let number = |columns: &[&[f64]]| -> Result<[f64; JOINTS], String> {
-            let values: [f64; JOINTS] = std::array::from_fn(|j| columns[j][row]);
-            match values.iter().position(|v| v.is_nan() || v.abs() > LARGEST_NUMBER) {
-                Some(j) if values[j].is_finite() => {
-                    Err(at(format!("{} is {:e}, no angle or velocity of an arm", JOINT_NAMES[j], values[j])))
-                }
-                Some(j) => Err(at(format!("{} is {}, not a finite number", JOINT_NAMES[j], values[j]))),
-                None => Ok(values),
-            }
-        };
-        let phase = Phase::ALL.into_iter().find(|p| p.name() == phases[row]).ok_or_else(|| {
-            at(format!("unknown phase \"{}\"; allowed: {}", phases[row], Phase::ALL.map(Phase::name).join(", ")))
-        })?;
-        let waypoint = Waypoint { phase, q_rad: number(&q)?, dq_rad_s: number(&dq)? };
-        let index = u64::try_from(episodes[row]).map_err(|_| at(format!("episode {} is negative", episodes[row])))?;
-        if steps[row] == 0 {
-            if !begun.insert(index) {
-                return Err(at(format!("episode {index} begins a second time")));
-            }
-            let scene: Scene = serde_json::from_str(&scenes[row]).map_err(|e| at(format!("the scene cannot be read: {e}")))?;
-            check_scene(&scene).map_err(|why| at(format!("the scene cannot be: {why}")))?;
-            plans.push(Plan { index, scene, waypoints: vec![waypoint] });
-            continue;
-        }
-        let plan = plans.last_mut().filter(|p| p.index == index && p.waypoints.len() as i64 == steps[row]);
-        let plan = plan.ok_or_else(|| at(format!("episode {index} step {} does not follow the row before", steps[row])))?;
-        if plan.waypoints[plan.waypoints.len() - 1].phase > phase {
-            return Err(at(format!("phase {} comes after a later one", phase.name())));
-        }
-        if plan.waypoints.len() > MOST_STEPS as usize {
-            return Err(at(format!("episode {index} has more than {MOST_STEPS} steps, the most that are executed")));
-        }
-        plan.waypoints.push(waypoint);
-    }
+    let mut rows = Rows::default();
+    let mut plans = rows.take(table)?;
+    plans.extend(rows.open);
     Ok(plans)
+}
+
+/// The plans in a table that comes in pieces, as [`from_table`] has them: one after another, in the memory of a piece.
+pub struct Plans<T> {
+    path: PathBuf,
+    tables: T,
+    rows: Rows,
+    ready: std::vec::IntoIter<Plan>,
+}
+
+impl<T> Plans<T> {
+    /// Of the pieces of a table; errors speak of `path`.
+    pub fn new(path: &Path, tables: T) -> Self {
+        Plans { path: path.to_path_buf(), tables, rows: Rows::default(), ready: Vec::new().into_iter() }
+    }
+}
+
+impl<T: Iterator<Item = crate::error::Result<Table>>> Iterator for Plans<T> {
+    type Item = crate::error::Result<Plan>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        loop {
+            if let Some(plan) = self.ready.next() {
+                return Some(Ok(plan));
+            }
+            let Some(table) = self.tables.next() else { return self.rows.open.take().map(Ok) };
+            match table.and_then(|table| self.rows.take(&table).map_err(|why| Error::input(&self.path, why))) {
+                Ok(plans) => self.ready = plans.into_iter(),
+                Err(error) => return Some(Err(error)),
+            }
+        }
+    }
+}
+
+/// What is known of the rows so far.
+#[derive(Default)]
+struct Rows {
+    count: usize,
+    begun: HashSet<u64>,
+    /// The plan of the last row, which may go on.
+    open: Option<Plan>,
+}
+
+impl Rows {
+    /// The plans that are known to end: all but the one of the last row.
+    fn take(&mut self, table: &Table) -> Result<Vec<Plan>, String> {
+        let (episodes, steps) = (integers(table, "episode")?, integers(table, "step")?);
+        let (phases, scenes) = (texts(table, "phase")?, texts(table, "scene")?);
+        let joints =
+            |suffix: &str| JOINT_NAMES.iter().map(|j| floats(table, &format!("{j}.{suffix}"))).collect::<Result<Vec<_>, _>>();
+        let (q, dq) = (joints("q_rad")?, joints("dq_rad_s")?);
+        if let Some(c) = table.columns.iter().find(|c| c.values.len() != episodes.len()) {
+            return Err(format!("column {} has {} rows, episode has {}", c.name, c.values.len(), episodes.len()));
+        }
+        let mut ended = Vec::new();
+        for row in 0..episodes.len() {
+            let at = |what: String| format!("row {}: {what}", self.count);
+            let phase = Phase::ALL.into_iter().find(|p| p.name() == phases[row]).ok_or_else(|| {
+                at(format!("unknown phase \"{}\"; allowed: {}", phases[row], Phase::ALL.map(Phase::name).join(", ")))
+            })?;
+            let (q_rad, dq_rad_s) = (numbers(&q, row).map_err(at)?, numbers(&dq, row).map_err(at)?);
+            let waypoint = Waypoint { phase, q_rad, dq_rad_s };
+            let index = u64::try_from(episodes[row]).map_err(|_| at(format!("episode {} is negative", episodes[row])))?;
+            if steps[row] == 0 {
+                if !self.begun.insert(index) {
+                    return Err(at(format!("episode {index} begins a second time")));
+                }
+                let scene = scene(&scenes[row]).map_err(at)?;
+                ended.extend(self.open.replace(Plan { index, scene, waypoints: vec![waypoint] }));
+            } else {
+                go_on(self.open.as_mut(), index, steps[row], waypoint).map_err(at)?;
+            }
+            self.count += 1;
+        }
+        Ok(ended)
+    }
+}
+
+/// The next step of a plan, which must be the one of the row before.
+fn go_on(open: Option<&mut Plan>, index: u64, step: i64, waypoint: Waypoint) -> Result<(), String> {
+    let plan = open.filter(|p| p.index == index && p.waypoints.len() as i64 == step);
+    let plan = plan.ok_or_else(|| format!("episode {index} step {step} does not follow the row before"))?;
+    if plan.waypoints[plan.waypoints.len() - 1].phase > waypoint.phase {
+        return Err(format!("phase {} comes after a later one", waypoint.phase.name()));
+    }
+    if plan.waypoints.len() > MOST_STEPS as usize {
+        return Err(format!("episode {index} has more than {MOST_STEPS} steps, the most that are executed"));
+    }
+    plan.waypoints.push(waypoint);
+    Ok(())
+}
+
+fn scene(json: &str) -> Result<Scene, String> {
+    let scene: Scene = serde_json::from_str(json).map_err(|e| format!("the scene cannot be read: {e}"))?;
+    check_scene(&scene).map_err(|why| format!("the scene cannot be: {why}"))?;
+    Ok(scene)
+}
+
+/// A row of nine columns.
+fn numbers(columns: &[&[f64]], row: usize) -> Result<[f64; JOINTS], String> {
+    let values: [f64; JOINTS] = std::array::from_fn(|j| columns[j][row]);
+    match values.iter().position(|v| v.is_nan() || v.abs() > LARGEST_NUMBER) {
+        Some(j) if values[j].is_finite() => Err(format!("{} is {:e}, no angle or velocity of an arm", JOINT_NAMES[j], values[j])),
+        Some(j) => Err(format!("{} is {}, not a finite number", JOINT_NAMES[j], values[j])),
+        None => Ok(values),
+    }
 }
 
 fn values<'a>(table: &'a Table, name: &str) -> Result<&'a Values, String> {

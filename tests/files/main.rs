@@ -8,10 +8,10 @@ mod limits;
 mod viewers;
 
 use fixtures::{contents, episode, provenance, table, tensors};
-use hilt::data::{inspect, inspect_text, json_file, recording, table_file, weights};
+use hilt::data::{ContentHash, inspect, inspect_text, json_file, recording, table_file, weights};
 use hilt::error::{Error, Result};
 use hilt::interrupt::Interrupt;
-use hilt::table::Values;
+use hilt::table::{Table, Values};
 use hilt::tasks::Task;
 use serde_json::json;
 use std::fs;
@@ -107,6 +107,49 @@ fn tables_round_trip_with_nan_and_damage_is_refused() {
     }
     let path = dir.path().join("3000.parquet");
     refuses_damage(&path, || table_file::read(&path));
+}
+
+/// The rows of several tables, column by column, in words: NaN is like NaN.
+fn rows(tables: &[Table]) -> Vec<Vec<String>> {
+    fn words<T: std::fmt::Debug>(values: &[T]) -> Vec<String> {
+        values.iter().map(|value| format!("{value:?}")).collect()
+    }
+    let cells = |values: &Values| match values {
+        Values::F32(v) => words(v),
+        Values::F64(v) => words(v),
+        Values::I64(v) => words(v),
+        Values::Bool(v) => words(v),
+        Values::Text(v) => words(v),
+    };
+    (0..tables[0].columns.len()).map(|i| tables.iter().flat_map(|t| cells(&t.columns[i].values)).collect()).collect()
+}
+
+#[test]
+fn a_table_that_is_written_and_read_in_pieces_is_the_same_table_and_damage_is_refused() {
+    let dir = tempdir().expect("dir");
+    let (path, origin) = (dir.path().join("groups.parquet"), provenance("plan", Task::PickUp));
+    let groups = [9000, 1, 20].map(table);
+    table_file::write_groups(&path, groups.iter().cloned().map(Ok), &origin).expect("written");
+    let bytes = fs::read(&path).expect("bytes");
+    let (whole, _) = table_file::read(&path).expect("readable as a whole");
+    let reader = table_file::Reader::open(&path).expect("readable");
+    assert_eq!((reader.provenance(), reader.content()), (&origin, ContentHash::of(&bytes)));
+    for _pass in 0..2 {
+        let pieces = reader.tables().expect("rows").collect::<Result<Vec<_>>>().expect("readable");
+        assert!(pieces.len() > 1 && pieces.iter().map(Table::rows).sum::<usize>() == whole.rows());
+        assert_eq!(rows(&pieces), rows(&groups));
+    }
+    assert_eq!(rows(&[whole]), rows(&groups));
+    refuses_damage(&path, || table_file::Reader::open(&path).map(drop));
+
+    // One group is the file of one table; an error or no group leaves what is there.
+    table_file::write_groups(&path, [Ok(table(30))].into_iter(), &origin).expect("written");
+    assert_eq!(fs::read(&path).expect("bytes"), table_file::encode(&path, &table(30), &origin).expect("encoded"));
+    let failing = [Ok(table(3)), Err(Error::Failed("no more".into()))];
+    assert!(table_file::write_groups(&path, failing.into_iter(), &origin).is_err());
+    table_file::write_groups(&path, std::iter::empty(), &origin).expect("nothing to do");
+    assert_eq!(table_file::read(&path).expect("the one before").0.rows(), 30);
+    assert_eq!(fs::read_dir(dir.path()).expect("readable").count(), 1, "left over");
 }
 
 #[test]

@@ -40,6 +40,10 @@ fn clean_runs_removes_what_make_made_and_nothing_else() {
     let runs = run.tree.path().join("runs");
     let clean = || command(run.tree.path(), &["clean-runs"]).output().expect("make runs");
     fs::write(run.at(".DS_Store"), "").expect("written");
+    for name in ["plans.unfinished/run-0/a", "recordings.unfinished/run-1/b", "recordings.unfinished/.DS_Store"] {
+        fs::create_dir_all(run.at(name).parent().expect("below the run")).expect("made");
+        fs::write(run.at(name), "").expect("written");
+    }
     fs::create_dir_all(runs.join("stack")).expect("made");
     fs::write(runs.join("stack/plans.parquet"), "another task's").expect("written");
     let foreign =

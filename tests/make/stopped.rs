@@ -53,3 +53,22 @@ fn a_signal_reaches_training_and_make_waits_for_its_checkpoint() {
         assert!(run.all(&[]).is_empty(), "the policy in place is the one of these settings");
     }
 }
+
+#[test]
+fn stopped_planning_and_simulation_go_on_by_themselves() {
+    let run = Run::finished();
+    let before = run.contents();
+    for (stage, artefact, first) in [("plan", "plans.parquet", 0), ("simulate", "recordings", 1)] {
+        // What a stopped stage leaves: some of its pieces, and no stamp.
+        let mut half = Command::new(env!("CARGO_BIN_EXE_hilt"));
+        half.args([stage, "--pipeline", "pipelines/pick-up.toml", "--task", "pick-up", "--sets", TINY, "--shard", "1/1"]);
+        assert!(half.current_dir(run.tree.path()).output().expect("the binary runs").status.success());
+        std::fs::remove_file(run.at(&format!("settings/{stage}.toml"))).expect("removed");
+        assert!(run.at(&format!("{}.unfinished", artefact.trim_end_matches(".parquet"))).is_dir());
+        let output = run.make(&[]);
+        let words = text(&output.stderr);
+        assert!(output.status.success() && words.contains(&format!("{stage}: goes on: 4 of 4 episodes")), "{words}");
+        assert_eq!(crate::stages(&output), crate::ALL[first..], "{stage}");
+        assert!(run.contents() == before, "{stage}: other files than before");
+    }
+}

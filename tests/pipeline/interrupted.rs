@@ -51,6 +51,12 @@ fn interrupted_by(name: &str, run: &Run, words: Vec<String>, wait: Duration) {
         assert!(stderr.contains("policy.checkpoint.safetensors: run the same command with --resume"), "{stderr}");
         fs::remove_file(run.at("policy.checkpoint.safetensors")).expect("the checkpoint");
     }
+    // Planning and simulation keep what they have finished, where they have.
+    for kept in ["plans.unfinished", "recordings.unfinished"].map(|name| run.at(name)).iter().filter(|dir| dir.exists()) {
+        let says = ["episodes are kept in ", kept.file_name().and_then(|n| n.to_str()).expect("a name"), "to go on"];
+        assert!(says.iter().all(|part| stderr.contains(part)), "{what}: {stderr}");
+        fs::remove_dir_all(kept).expect("removed");
+    }
     run.unchanged(&what, &before);
 }
 

@@ -2,6 +2,7 @@
 
 mod bad_input;
 mod bad_numbers;
+mod continued;
 mod demos;
 mod ends;
 mod fixtures;

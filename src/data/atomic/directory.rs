@@ -7,6 +7,7 @@ use crate::error::{Error, Result};
 use rustix::fs::{AtFlags, CWD, RenameFlags, StatxAttributes, StatxFlags, renameat_with, statx};
 use rustix::io::Errno;
 use std::fs;
+use std::io::ErrorKind;
 use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
 
@@ -27,6 +28,18 @@ pub fn write_dir(path: &Path, ours: impl Fn(&Path) -> bool, fill: impl FnOnce(&P
         .map_err(|e| Error::io(path, "rename", e))?;
     sync_directory(parent);
     Ok(())
+}
+
+/// Removes a directory and all in it. It is gone in one step: no other process sees a part of it, and one that is killed leaves nothing of it.
+///
+/// # Errors
+/// [`Error::Io`] when the system refuses.
+pub(super) fn remove_dir(path: &Path) -> Result<()> {
+    let aside = temporary::directory(parent_of(path)?, path)?;
+    match fs::rename(path, aside.dir.path().join("old")) {
+        Err(e) if e.kind() != ErrorKind::NotFound => Err(Error::io(path, "remove", e)),
+        _ => aside.dir.close().map_err(|e| Error::io(path, "remove", e)),
+    }
 }
 
 /// Where a directory goes.

@@ -3,11 +3,13 @@
 //! and what is no regular file (a device, a pipe) is written into.
 
 mod directory;
+mod pieces;
 mod target;
 mod temporary;
 
 pub use directory::write_dir;
-pub use target::{Target, target};
+pub use pieces::{Workplace, link, write_piece};
+pub use target::{Target, follow, target};
 pub(super) use temporary::is_temporary;
 
 use super::litter::{FileKind, kind_of_name};
@@ -16,7 +18,7 @@ use crate::interrupt;
 use rustix::fs::OFlags;
 use rustix::io::Errno;
 use std::fs::{self, File};
-use std::io::Write;
+use std::io::{Read, Seek, Write};
 use std::os::unix::fs::{MetadataExt, OpenOptionsExt, chown};
 use std::path::{Path, PathBuf};
 use std::thread::sleep;
@@ -40,17 +42,42 @@ pub fn write_all(files: &[(PathBuf, Vec<u8>)]) -> Result<()> {
     let mut written = Vec::new();
     for ((path, bytes), target) in files.iter().zip(&targets) {
         if let Target::File(place) = target {
-            written.push((path, place, beside(path, place, bytes)?));
+            let mut file = beside(path, place)?;
+            finish(path, &mut file, bytes)?;
+            written.push((path, place, file));
         }
     }
     for ((path, bytes), target) in files.iter().zip(&targets) {
         if let Target::Stream(place) = target {
-            write_into(place, bytes).map_err(|e| Error::io(path, "write", e))?;
+            write_into(place, &mut &bytes[..]).map_err(|e| Error::io(path, "write", e))?;
         }
     }
     for (path, place, file) in written {
         file.persist(place).map_err(|e| Error::io(path, "rename", e.error))?;
         sync_directory(parent_of(place)?);
+    }
+    Ok(())
+}
+
+/// Writes a file that need not fit into memory: `fill` writes into an empty one, which takes the place of `path` when it has succeeded.
+///
+/// # Errors
+/// As [`write_all`]; what `fill` returns.
+pub fn write_with(path: &Path, fill: impl FnOnce(&mut File) -> Result<()>) -> Result<()> {
+    let unwritten = |e| Error::io(path, "write", e);
+    match target(path)? {
+        Target::File(place) => {
+            let mut file = beside(path, &place)?;
+            fill(file.as_file_mut())?;
+            finish(path, &mut file, &[])?;
+            file.persist(&place).map_err(|e| Error::io(path, "rename", e.error))?;
+            sync_directory(parent_of(&place)?);
+        }
+        Target::Stream(place) => {
+            let mut file = tempfile::tempfile().map_err(unwritten)?;
+            fill(&mut file)?;
+            file.rewind().and_then(|()| write_into(&place, &mut file)).map_err(unwritten)?;
+        }
     }
     Ok(())
 }
@@ -65,18 +92,22 @@ pub fn write_new(path: &Path, bytes: &[u8]) -> Result<()> {
     file.write_all(bytes).and_then(|()| file.sync_all()).map_err(|e| Error::io(path, "write", e))
 }
 
-/// The bytes in a temporary file beside `place`, with the owner and the permissions of the file that stands there.
-fn beside(path: &Path, place: &Path, bytes: &[u8]) -> Result<NamedTempFile> {
+/// A temporary file beside `place`, with the owner and the permissions of the file that stands there.
+fn beside(path: &Path, place: &Path) -> Result<NamedTempFile> {
     let parent = parent_of(place)?;
     temporary::sweep(parent);
-    let mut file = temporary::file(parent, path)?;
+    let file = temporary::file(parent, path)?;
     if let Ok(old) = fs::metadata(place) {
         // Only root may give files away; where it does not, the new one is the user's own.
         let _ = chown(file.path(), Some(old.uid()), Some(old.gid()));
         file.as_file().set_permissions(old.permissions()).map_err(|e| Error::io(path, "create", e))?;
     }
-    file.write_all(bytes).and_then(|()| file.as_file().sync_all()).map_err(|e| Error::io(path, "write", e))?;
     Ok(file)
+}
+
+/// The last bytes of a temporary file; then it is on the disk.
+fn finish(path: &Path, file: &mut NamedTempFile, bytes: &[u8]) -> Result<()> {
+    file.write_all(bytes).and_then(|()| file.as_file().sync_all()).map_err(|e| Error::io(path, "write", e))
 }
 
 /// How long a pipe may have no reader.
@@ -85,7 +116,7 @@ const READER_PATIENCE: Duration = Duration::from_secs(5);
 const READER_TICK: Duration = Duration::from_millis(20);
 
 /// Into a device or a pipe.
-fn write_into(place: &Path, bytes: &[u8]) -> std::io::Result<()> {
+fn write_into(place: &Path, from: &mut impl Read) -> std::io::Result<()> {
     let waits = interrupt::waiting();
     let began = Instant::now();
     // Opened without waiting, to learn whether a pipe has a reader; a write waits for the reader as usual.
@@ -103,7 +134,7 @@ fn write_into(place: &Path, bytes: &[u8]) -> std::io::Result<()> {
     };
     let mut stream = open(OFlags::empty())?;
     drop((probe, waits));
-    stream.write_all(bytes)
+    std::io::copy(from, &mut stream).map(drop)
 }
 
 /// Whether a file could be written to `path`, asked before the work that makes it; nothing is created.

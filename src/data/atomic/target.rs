@@ -52,7 +52,10 @@ pub fn target(path: &Path) -> Result<Target> {
 }
 
 /// The place that a chain of links leads to, with its directory in the system's own words where that exists.
-pub(super) fn follow(path: &Path) -> Result<PathBuf> {
+///
+/// # Errors
+/// [`Error::Input`] when the links go in a circle.
+pub fn follow(path: &Path) -> Result<PathBuf> {
     let mut place = absolute(path);
     for _ in 0..MAX_LINKS {
         if place.starts_with(OPEN_FILES) {

@@ -16,6 +16,9 @@ use serde_json::{Map, Value, json};
 use std::collections::BTreeSet;
 use std::path::Path;
 
+/// The ending of a directory of pieces.
+const UNFINISHED: &str = "unfinished";
+
 /// Describes the artefact at `path`: a recording or a directory of them, a table, a dataset or the pair of datasets, weights, a
 /// summary. The field `kind` says which; `provenance` is what it carries of its origin.
 ///
@@ -71,6 +74,10 @@ fn directory(path: &Path, interrupt: &Interrupt) -> Result<Value> {
             found.insert(name.into(), described_dataset(&dataset::read(&path.join(name))?));
         }
         return Ok(Value::Object(found));
+    }
+    if path.extension().is_some_and(|ending| ending == UNFINISHED) {
+        let message = "is not finished: it holds the pieces of a stage that was stopped; run its command again to go on";
+        return Err(Error::input(path, message));
     }
     recordings::all(path, interrupt)
 }
