@@ -9,10 +9,12 @@ use arrow_array::RecordBatch;
 use arrow_schema::{Schema, SchemaRef};
 use parquet::arrow::ArrowWriter;
 use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
+use parquet::arrow::arrow_writer::ArrowRowGroupWriterFactory;
 use parquet::basic::{Compression, ZstdLevel};
 use parquet::errors::ParquetError;
 use parquet::file::metadata::KeyValue;
 use parquet::file::properties::WriterProperties;
+use parquet::file::writer::SerializedFileWriter;
 use prost::bytes::Bytes;
 use std::path::Path;
 use std::sync::Arc;
@@ -49,9 +51,11 @@ impl Writer {
         self.writer.flush()
     }
 
-    /// Bytes so far.
-    pub(super) fn len(&self) -> usize {
-        self.writer.bytes_written()
+    /// The empty file, and what encodes its row groups elsewhere.
+    pub(super) fn into_parts(
+        self,
+    ) -> std::result::Result<(SerializedFileWriter<Vec<u8>>, ArrowRowGroupWriterFactory), ParquetError> {
+        self.writer.into_serialized_writer()
     }
 
     /// The whole file, sealed.
