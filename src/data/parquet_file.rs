@@ -128,6 +128,19 @@ const TEXTS_AT_ONCE: usize = 64 << 20;
 
 /// All batches of a Parquet file, as long as they are no larger than its size allows.
 pub(super) fn decode(bytes: Vec<u8>) -> std::result::Result<(SchemaRef, Vec<RecordBatch>), String> {
+    let mut batches = Vec::new();
+    let schema = decode_each(bytes, &mut |batch| {
+        batches.push(batch.clone());
+        Ok(())
+    })?;
+    Ok((schema, batches))
+}
+
+/// What is shown a batch.
+type See<'a> = dyn FnMut(&RecordBatch) -> std::result::Result<(), String> + 'a;
+
+/// As [`decode`], one batch after the other.
+pub(super) fn decode_each(bytes: Vec<u8>, see: &mut See) -> std::result::Result<SchemaRef, String> {
     let longest_text = parquet_limits::check(&bytes)?;
     let rows = (TEXTS_AT_ONCE / longest_text.max(1)).clamp(1, ROWS_AT_ONCE);
     let mut budget = Budget::new();
@@ -135,14 +148,12 @@ pub(super) fn decode(bytes: Vec<u8>) -> std::result::Result<(SchemaRef, Vec<Reco
     guarded(|| {
         let builder = ParquetRecordBatchReaderBuilder::try_new(Bytes::from(bytes)).map_err(|e| e.to_string())?;
         let schema = Arc::clone(builder.schema());
-        let reader = builder.with_batch_size(rows).build().map_err(|e| e.to_string())?;
-        let mut batches = Vec::new();
-        for batch in reader {
+        for batch in builder.with_batch_size(rows).build().map_err(|e| e.to_string())? {
             let batch = batch.map_err(|e| e.to_string())?;
             budget.take(batch.get_array_memory_size() as u64)?;
-            batches.push(batch);
+            see(&batch)?;
         }
-        Ok((schema, batches))
+        Ok(schema)
     })
     .unwrap_or_else(|_| Err("its inner structure is broken".into()))
 }

@@ -11,6 +11,7 @@ mod features;
 mod files;
 mod meta;
 mod read;
+mod rows;
 mod scratch;
 mod split;
 mod stats;
@@ -18,7 +19,7 @@ mod twins;
 mod whole;
 mod write;
 
-pub use read::{Dataset, read, read_for};
+pub use read::{Dataset, Description, each, read, read_for};
 pub use split::split;
 pub use twins::{Fingerprint, first_shared, first_twins};
 
