@@ -61,8 +61,8 @@ pub fn demo() -> Demo {
 /// Writes a dataset of two short episodes.
 pub fn dataset(root: &Path) {
     let demo = demo();
-    let of = |source_index| DatasetEpisode { source_index, demo: &demo, rewards: vec![0.5; STEPS], success: true };
-    dataset::write(root, demo.task(), &[of(0), of(1)], &provenance("convert")).expect("a dataset");
+    let of = |source_index| DatasetEpisode { source_index, demo: demo.clone(), rewards: vec![0.5; STEPS], success: true };
+    dataset::write(root, demo.task(), &[of(0), of(1)].as_slice().into(), &provenance("convert")).expect("a dataset");
 }
 
 /// A dynamics network of a few units.

@@ -1,14 +1,17 @@
 use super::common::{SettingsArgs, path_or, same_task};
 use super::places::Content;
-use super::{Console, Context, Outcome, dropped};
+use super::{Console, Context, Outcome, Progress, dropped};
 use crate::config::Stage;
-use crate::data::{ContentHash, dataset, recording};
-use crate::demo::{Demo, Episode};
+use crate::data::dataset::{self, DatasetEpisode, Episodes, Fingerprint};
+use crate::data::{ContentHash, recording};
+use crate::demo::Episode;
 use crate::error::{Error, Result};
 use crate::tasks::Task;
 use rayon::prelude::*;
+use std::borrow::Cow;
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// Turn recordings into two LeRobot datasets, train and validation. Failed episodes are dropped, counted and named.
 #[derive(Debug, clap::Args)]
@@ -26,13 +29,22 @@ pub struct Args {
 /// For when no episode succeeded.
 const ADVICE: &str = "record again with less noise (simulate.noise_variance), or keep them with convert.keep_failed=true";
 
-/// A recording that was read.
-struct Loaded {
+/// Demos are kept from the first reading up to so many bytes of their numbers, some 4,000 pick-ups; the others are read a second time, so
+/// that memory does not grow with the number of recordings.
+const HELD_BYTES: usize = 64 << 20;
+
+/// What is kept of a recording that was read.
+struct Found {
+    path: PathBuf,
     /// Its number by its file's name: unique also where the recordings of several runs were put together.
     number: u64,
-    episode: Episode,
-    demo: Demo,
     seed: u64,
+    steps: usize,
+    /// Of its bytes.
+    hash: ContentHash,
+    fingerprint: Fingerprint,
+    /// What the dataset takes of it, if there was room.
+    held: Option<DatasetEpisode>,
 }
 
 pub fn run(args: &Args, context: &Context) -> Result<Outcome> {
@@ -46,13 +58,14 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome> {
     }
 
     let progress = context.console.progress("convert", files.len() as u64, "recordings");
+    let room = Room(AtomicUsize::new(HELD_BYTES));
     let read: Vec<Result<(ContentHash, dropped::Kept<_>)>> = files
         .par_iter()
         .map(|path| {
             context.interrupt.check()?;
-            let loaded = load(path, pipeline.task, pipeline.convert.keep_failed);
+            let found = find(path, pipeline.task, pipeline.convert.keep_failed, &room);
             progress.step();
-            loaded
+            found
         })
         .collect();
     // One after the other: of several that cannot be used the first by name is told, whatever the threads.
@@ -70,49 +83,81 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome> {
     }
 
     let (train, validation) = dataset::split(kept.len(), pipeline.convert.train_per_validation, args.settings.seed);
-    let pick = |indices: &[usize]| -> Vec<_> { indices.iter().map(|i| kept[*i].for_dataset()).collect() };
+    let again = kept.iter().filter(|found| found.held.is_none()).count() as u64;
+    let progress = (again > 0).then(|| context.console.progress("convert", again, "recordings read again"));
+    let pick = |positions: &[usize]| {
+        let picked: Vec<&Found> = positions.iter().map(|at| &kept[*at]).collect();
+        let steps = picked.iter().map(|found| found.steps).collect();
+        let progress = progress.as_ref();
+        Episodes::new(steps, move |at| picked[at].episode(progress))
+    };
     let names = files.iter().filter_map(|path| path.file_name()?.to_str());
     let content = ContentHash::of_directory(names.zip(hashes));
     let provenance = args.settings.provenance(Stage::Convert, &pipeline, &[("recordings", content)])?;
     dataset::write_split(&out, pipeline.task, &pick(&train), &pick(&validation), &provenance, &context.interrupt)?;
+    progress.into_iter().for_each(|progress| progress.finish(""));
     let (to, t, v) = (out.display(), train.len(), validation.len());
     context.console.say(&format!("convert: wrote {to}: {t} training and {v} validation episodes"));
     Ok(outcome)
 }
 
-/// A recording, and the hash of its bytes; a failed episode is dropped.
-fn load(path: &Path, task: Task, keep_failed: bool) -> Result<(ContentHash, dropped::Kept<Loaded>)> {
+/// Memory that may still be taken \[bytes\].
+struct Room(AtomicUsize);
+
+impl Room {
+    /// Whether so much could be taken.
+    fn take(&self, bytes: usize) -> bool {
+        self.0.try_update(Ordering::Relaxed, Ordering::Relaxed, |left| left.checked_sub(bytes)).is_ok()
+    }
+}
+
+/// The hash of a recording's bytes, and what is kept of it; a failed episode is dropped.
+fn find(path: &Path, task: Task, keep_failed: bool, room: &Room) -> Result<(ContentHash, dropped::Kept<Found>)> {
     let (episode, made, hash) = recording::read_hashed(path)?;
     same_task(path, episode.scene.task, task)?;
     let number = path.file_name().and_then(|name| recording::number_of(name.to_str()?)).unwrap_or(episode.index);
-    let kept = match episode.failure {
-        Some(class) if !keep_failed => Err(format!("episode {number} failed, {}: {}", class.name(), class.words())),
-        _ => {
-            let demo = episode.to_demo().map_err(|why| Error::input(path, why))?;
-            Ok(Loaded { number, episode, demo, seed: made.seed })
-        }
-    };
-    Ok((hash, kept))
+    if let Some(class) = episode.failure.filter(|_| !keep_failed) {
+        return Ok((hash, Err(format!("episode {number} failed, {}: {}", class.name(), class.words()))));
+    }
+    let taken = taken(path, &episode, number)?;
+    let (steps, fingerprint) = (taken.demo.len(), Fingerprint::of(&taken.demo));
+    let held = room.take(taken.bytes()).then_some(taken);
+    Ok((hash, Ok(Found { path: path.to_path_buf(), number, seed: made.seed, steps, hash, fingerprint, held })))
 }
 
-impl Loaded {
-    fn for_dataset(&self) -> dataset::DatasetEpisode<'_> {
-        dataset::DatasetEpisode { source_index: self.number, ..dataset::DatasetEpisode::of(&self.episode, &self.demo) }
+/// What the dataset takes of an episode.
+fn taken(path: &Path, episode: &Episode, number: u64) -> Result<DatasetEpisode> {
+    let demo = episode.to_demo().map_err(|why| Error::input(path, why))?;
+    Ok(DatasetEpisode { source_index: number, ..DatasetEpisode::of(episode, demo) })
+}
+
+impl Found {
+    /// What the dataset takes of it, held or read again.
+    fn episode(&self, progress: Option<&Progress>) -> Result<Cow<'_, DatasetEpisode>> {
+        if let Some(held) = &self.held {
+            return Ok(Cow::Borrowed(held));
+        }
+        let (episode, _, hash) = recording::read_hashed(&self.path)?;
+        if hash != self.hash {
+            return Err(Error::input(&self.path, "changed while hilt convert was reading it; run hilt convert again"));
+        }
+        progress.into_iter().for_each(Progress::step);
+        taken(&self.path, &episode, self.number).map(Cow::Owned)
     }
 }
 
 /// The same episode twice would stand in training and validation, or count twice.
-fn refuse_twins(dir: &Path, loaded: &[Loaded]) -> Result<()> {
-    let Some((one, other)) = dataset::first_twins(loaded.iter().map(|l| &l.demo)) else { return Ok(()) };
-    let [one, other] = [one, other].map(|at| recording::file_name(loaded[at].number));
+fn refuse_twins(dir: &Path, found: &[Found]) -> Result<()> {
+    let Some((one, other)) = dataset::first_twins(found.iter().map(|f| f.fingerprint)) else { return Ok(()) };
+    let [one, other] = [one, other].map(|at| recording::file_name(found[at].number));
     let message =
         format!("is the same episode as {one}, in every number: both could land in training and validation; remove one of them");
     Err(Error::input(&dir.join(other), message))
 }
 
 /// Says so when the recordings are of several runs.
-fn say_of_runs(loaded: &[Loaded], console: &Console) {
-    let seeds: BTreeSet<u64> = loaded.iter().map(|l| l.seed).collect();
+fn say_of_runs(found: &[Found], console: &Console) {
+    let seeds: BTreeSet<u64> = found.iter().map(|f| f.seed).collect();
     if seeds.len() > 1 {
         let seeds: Vec<String> = seeds.iter().map(u64::to_string).collect();
         console.say(&format!(

@@ -9,10 +9,12 @@ use arrow_array::RecordBatch;
 use arrow_schema::{Schema, SchemaRef};
 use parquet::arrow::ArrowWriter;
 use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
+use parquet::arrow::arrow_writer::ArrowRowGroupWriterFactory;
 use parquet::basic::{Compression, ZstdLevel};
 use parquet::errors::ParquetError;
 use parquet::file::metadata::KeyValue;
 use parquet::file::properties::WriterProperties;
+use parquet::file::writer::SerializedFileWriter;
 use prost::bytes::Bytes;
 use std::fs::File;
 use std::io::{self, Write};
@@ -73,9 +75,9 @@ impl<W: Write + Send> Writer<W> {
         self.writer.flush()
     }
 
-    /// Bytes so far.
-    pub(super) fn len(&self) -> usize {
-        self.writer.bytes_written()
+    /// The empty file, and what encodes its row groups elsewhere.
+    pub(super) fn into_parts(self) -> std::result::Result<(SerializedFileWriter<W>, ArrowRowGroupWriterFactory), ParquetError> {
+        self.writer.into_serialized_writer()
     }
 }
 
@@ -160,6 +162,19 @@ const TEXTS_AT_ONCE: usize = 64 << 20;
 
 /// All batches of a Parquet file, as long as they are no larger than its size allows.
 pub(super) fn decode(bytes: Vec<u8>) -> std::result::Result<(SchemaRef, Vec<RecordBatch>), String> {
+    let mut batches = Vec::new();
+    let schema = decode_each(bytes, &mut |batch| {
+        batches.push(batch.clone());
+        Ok(())
+    })?;
+    Ok((schema, batches))
+}
+
+/// What is shown a batch.
+type See<'a> = dyn FnMut(&RecordBatch) -> std::result::Result<(), String> + 'a;
+
+/// As [`decode`], one batch after the other.
+pub(super) fn decode_each(bytes: Vec<u8>, see: &mut See) -> std::result::Result<SchemaRef, String> {
     let longest_text = parquet_limits::check(&bytes)?;
     let rows = rows_at_once(longest_text);
     let mut budget = Budget::new();
@@ -167,14 +182,12 @@ pub(super) fn decode(bytes: Vec<u8>) -> std::result::Result<(SchemaRef, Vec<Reco
     guarded(|| {
         let builder = ParquetRecordBatchReaderBuilder::try_new(Bytes::from(bytes)).map_err(|e| e.to_string())?;
         let schema = Arc::clone(builder.schema());
-        let reader = builder.with_batch_size(rows).build().map_err(|e| e.to_string())?;
-        let mut batches = Vec::new();
-        for batch in reader {
+        for batch in builder.with_batch_size(rows).build().map_err(|e| e.to_string())? {
             let batch = batch.map_err(|e| e.to_string())?;
             budget.take(batch.get_array_memory_size() as u64)?;
-            batches.push(batch);
+            see(&batch)?;
         }
-        Ok((schema, batches))
+        Ok(schema)
     })
     .unwrap_or_else(|_| Err(BROKEN.into()))
 }

@@ -35,6 +35,19 @@ pub fn close(mut bytes: Vec<u8>) -> Vec<u8> {
     bytes
 }
 
+/// As [`close`], of the end of a file that holds the seal; what comes before it has gone into `before`. Returns the hash of the whole
+/// file too.
+///
+/// # Panics
+/// As [`close`].
+pub(super) fn close_end(before: &blake3::Hasher, mut end: Vec<u8>) -> (Vec<u8>, blake3::Hash) {
+    let at = digits_at(&end).expect("the writer put a blank seal into the end of the file");
+    let hash = before.clone().update(&end).finalize().to_hex();
+    end[at..at + DIGITS].copy_from_slice(hash.as_bytes());
+    let whole = before.clone().update(&end).finalize();
+    (end, whole)
+}
+
 /// As [`close`], of bytes that others made: `None` when they hold no seal. A seal is a checksum: whoever can write can make one, so
 /// what stands behind it is not trusted.
 pub fn reseal(bytes: Vec<u8>) -> Option<Vec<u8>> {
@@ -202,6 +215,14 @@ mod tests {
                 file.write_all_at(&[bytes[at]], at as u64).expect("written");
             }
         }
+    }
+
+    #[test]
+    fn a_file_sealed_at_its_end_is_the_file_sealed_whole() {
+        let (head, end) = ("some bytes ".as_bytes(), format!("{} and a tail", blank()).into_bytes());
+        let whole = close([head, &end].concat());
+        let (end, hash) = close_end(blake3::Hasher::new().update(head), end);
+        assert_eq!(([head, &end].concat(), hash), (whole.clone(), blake3::hash(&whole)));
     }
 
     #[test]

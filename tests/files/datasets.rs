@@ -28,8 +28,8 @@ fn demos(episodes: &[Episode]) -> Vec<Demo> {
 fn write(root: &Path, task: Task) -> Vec<Demo> {
     let episodes = episodes(task);
     let demos = demos(&episodes);
-    let rows: Vec<DatasetEpisode> = episodes.iter().zip(&demos).map(|(e, d)| DatasetEpisode::of(e, d)).collect();
-    dataset::write(root, task, &rows, &provenance("convert", task)).expect("written");
+    let rows: Vec<DatasetEpisode> = episodes.iter().zip(&demos).map(|(e, d)| DatasetEpisode::of(e, d.clone())).collect();
+    dataset::write(root, task, &rows.as_slice().into(), &provenance("convert", task)).expect("written");
     demos
 }
 
@@ -167,13 +167,15 @@ fn nothing_is_written_without_episodes_or_over_foreign_files() {
     let (_dir, root) = written(Task::PickUp);
     let before = contents(&root);
     let origin = provenance("convert", Task::PickUp);
-    let message = dataset::write(&root, Task::PickUp, &[], &origin).unwrap_err().to_string();
+    let message = dataset::write(&root, Task::PickUp, &[].as_slice().into(), &origin).unwrap_err().to_string();
     assert!(message.contains("at least one episode"), "{message}");
     assert_eq!(contents(&root), before);
     let (stack, home) = (episodes(Task::Stack), root.join("data"));
     let demos = demos(&stack);
-    let rows: Vec<DatasetEpisode> = stack.iter().zip(&demos).map(|(e, d)| DatasetEpisode::of(e, d)).collect();
-    assert!(dataset::write(&root, Task::PickUp, &rows, &origin).unwrap_err().to_string().contains("is of stack"));
-    assert!(dataset::write(&home, Task::Stack, &rows, &origin).unwrap_err().to_string().contains("chunk-000"));
+    let rows: Vec<DatasetEpisode> = stack.iter().zip(&demos).map(|(e, d)| DatasetEpisode::of(e, d.clone())).collect();
+    assert!(
+        dataset::write(&root, Task::PickUp, &rows.as_slice().into(), &origin).unwrap_err().to_string().contains("is of stack")
+    );
+    assert!(dataset::write(&home, Task::Stack, &rows.as_slice().into(), &origin).unwrap_err().to_string().contains("chunk-000"));
     assert_eq!(contents(&root), before);
 }

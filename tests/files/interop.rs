@@ -23,12 +23,13 @@ fn write_a_run() {
         }
         let demos: Vec<_> = episodes.iter().map(|e| e.to_demo().expect("a demo")).collect();
         let (train, validation) = dataset::split(episodes.len(), 10, 0);
-        let pick = |of: &[usize]| of.iter().map(|i| DatasetEpisode::of(&episodes[*i], &demos[*i])).collect::<Vec<_>>();
+        let pick = |of: &[usize]| of.iter().map(|i| DatasetEpisode::of(&episodes[*i], demos[*i].clone())).collect::<Vec<_>>();
+        let (train, validation) = (pick(&train), pick(&validation));
         dataset::write_split(
             &dir.join("dataset"),
             task,
-            &pick(&train),
-            &pick(&validation),
+            &train.as_slice().into(),
+            &validation.as_slice().into(),
             &origin("convert"),
             &Interrupt::default(),
         )

@@ -44,12 +44,12 @@ fn every_format_is_written_as_it_was() {
     let rows: Vec<DatasetEpisode> = (0..demos.len())
         .map(|i| DatasetEpisode {
             source_index: source_episodes[i],
-            demo: &demos[i],
+            demo: demos[i].clone(),
             rewards: rewards[i].clone(),
             success: successes[i],
         })
         .collect();
-    dataset::write(&to, task, &rows, &provenance).expect("written");
+    dataset::write(&to, task, &rows.as_slice().into(), &provenance).expect("written");
 
     let (from, to) = at("policy.safetensors");
     let (tensors, meta, origin) = weights::read(&from, "policy").expect("weights");

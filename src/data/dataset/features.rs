@@ -44,7 +44,20 @@ impl Kind {
             Kind::Bool => "bool",
         }
     }
+
+    /// The number of a key of [`Cells::for_each`].
+    pub(super) fn value(self, key: u64) -> f64 {
+        match self {
+            Kind::F32 => f64::from(f32::from_bits(if key & F32_SIGN == 0 { !(key as u32) } else { (key ^ F32_SIGN) as u32 })),
+            Kind::I64 => (key ^ I64_SIGN) as i64 as f64,
+            Kind::Bool => key as f64,
+        }
+    }
 }
+
+/// Bits of the sign.
+const F32_SIGN: u64 = 1 << 31;
+const I64_SIGN: u64 = 1 << 63;
 
 /// A column: `width` numbers a row; a scalar when that is 1.
 #[derive(Clone, Debug)]
@@ -101,6 +114,43 @@ impl Cells {
         }
     }
 
+    /// Number of values.
+    pub(super) fn len(&self) -> usize {
+        match self {
+            Cells::F32(v) => v.len(),
+            Cells::I64(v) => v.len(),
+            Cells::Bool(v) => v.len(),
+        }
+    }
+
+    /// Shows every value with its place in its row of `width`, and with a key that sorts as the values do.
+    pub(super) fn for_each(&self, width: usize, mut take: impl FnMut(usize, f64, u64)) {
+        let key = |x: f32| u64::from(if x.is_sign_negative() { !x.to_bits() } else { x.to_bits() | F32_SIGN as u32 });
+        match self {
+            Cells::F32(v) => by_row(v, width, |at, x| take(at, f64::from(x), key(x))),
+            Cells::I64(v) => by_row(v, width, |at, x| take(at, x as f64, x as u64 ^ I64_SIGN)),
+            Cells::Bool(v) => by_row(v, width, |at, x| take(at, f64::from(u8::from(x)), u64::from(x))),
+        }
+    }
+
+    /// Adds the values to `bytes`, which [`Cells::of_bytes`] reads.
+    pub(super) fn push_bytes(&self, bytes: &mut Vec<u8>) {
+        match self {
+            Cells::F32(v) => v.iter().for_each(|x| bytes.extend(x.to_le_bytes())),
+            Cells::I64(v) => v.iter().for_each(|x| bytes.extend(x.to_le_bytes())),
+            Cells::Bool(v) => v.iter().for_each(|x| bytes.push(u8::from(*x))),
+        }
+    }
+
+    /// The inverse of [`Cells::push_bytes`].
+    pub(super) fn of_bytes(kind: Kind, bytes: &[u8]) -> Self {
+        match kind {
+            Kind::F32 => Cells::F32(bytes.as_chunks().0.iter().map(|b| f32::from_le_bytes(*b)).collect()),
+            Kind::I64 => Cells::I64(bytes.as_chunks().0.iter().map(|b| i64::from_le_bytes(*b)).collect()),
+            Kind::Bool => Cells::Bool(bytes.iter().map(|b| *b != 0).collect()),
+        }
+    }
+
     /// As an Arrow column of `width` numbers a row.
     pub(super) fn to_array(&self, width: usize) -> ArrayRef {
         let flat: ArrayRef = match self {
@@ -114,6 +164,10 @@ impl Cells {
         let item = Arc::new(Field::new_list_field(flat.data_type().clone(), true));
         Arc::new(FixedSizeListArray::new(item, width as i32, flat, None))
     }
+}
+
+fn by_row<T: Copy>(values: &[T], width: usize, mut take: impl FnMut(usize, T)) {
+    values.chunks_exact(width).for_each(|row| row.iter().enumerate().for_each(|(at, x)| take(at, *x)));
 }
 
 /// The Arrow field of a feature, its description and names in the metadata.
@@ -134,9 +188,9 @@ pub(super) fn field(feature: &Feature) -> Field {
     Field::new(feature.name, kind, false).with_metadata(metadata)
 }
 
-/// The columns of one episode, in the order of [`features`]. `number` is its place in the dataset, `first` that of its first frame.
-pub(super) fn cells(task: Task, episode: &DatasetEpisode, number: usize, first: usize) -> Vec<Cells> {
-    let (demo, t_end) = (episode.demo, episode.demo.len());
+/// The columns of one episode. `number` is its place in the dataset, `first` that of its first frame.
+pub(super) fn cells(features: &[Feature], episode: &DatasetEpisode, number: usize, first: usize) -> Vec<Cells> {
+    let (demo, t_end) = (&episode.demo, episode.demo.len());
     let part = |from: usize, environment: bool| {
         let rows = (from..from + t_end).map(|t| demo.state(t));
         Cells::F32(
@@ -163,7 +217,7 @@ pub(super) fn cells(task: Task, episode: &DatasetEpisode, number: usize, first: 
         // A dataset holds one task: row 0.
         _ => Cells::I64(vec![0; t_end]),
     };
-    features(task).iter().map(fill).collect()
+    features.iter().map(fill).collect()
 }
 
 /// Time of a frame since the start of its episode \[s\].

@@ -3,7 +3,7 @@
 /// Names of the statistics, `count` aside.
 pub(super) const NAMES: [&str; 9] = ["min", "max", "mean", "std", "q01", "q10", "q50", "q90", "q99"];
 /// Levels of the last five.
-const LEVELS: [f64; 5] = [0.01, 0.10, 0.50, 0.90, 0.99];
+pub(super) const LEVELS: [f64; 5] = [0.01, 0.10, 0.50, 0.90, 0.99];
 
 /// Statistics of one feature.
 #[derive(Clone, Debug, PartialEq)]
@@ -22,19 +22,27 @@ pub(super) fn stats(values: &[f64], width: usize) -> Stats {
         let mut column: Vec<f64> = values.iter().skip(entry).step_by(width).copied().collect();
         let mean = column.iter().sum::<f64>() / count as f64;
         let variance = column.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / count as f64;
-        column.sort_by(f64::total_cmp);
-        let head = [column[0], column[count - 1], mean, variance.sqrt()];
-        for (row, value) in rows.iter_mut().zip(head.into_iter().chain(LEVELS.map(|level| quantile(&column, level)))) {
-            row.push(value);
-        }
+        column.sort_unstable_by(f64::total_cmp);
+        let found = of_entry(count, mean, variance, |place| column[place]);
+        rows.iter_mut().zip(found).for_each(|(row, value)| row.push(value));
     }
     Stats { rows, count }
 }
 
-fn quantile(sorted: &[f64], level: f64) -> f64 {
-    let place = level * (sorted.len() - 1) as f64;
-    let (below, above) = (sorted[place.floor() as usize], sorted[place.ceil() as usize]);
-    below + (above - below) * place.fract()
+/// The statistics of an entry, as in [`NAMES`]; `sorted` gives the value at a place of its sorted column of `count` values.
+pub(super) fn of_entry(count: usize, mean: f64, variance: f64, sorted: impl Fn(usize) -> f64) -> [f64; NAMES.len()] {
+    let quantile = |level: f64| {
+        let (below, above, share) = neighbours(level, count);
+        sorted(below) + (sorted(above) - sorted(below)) * share
+    };
+    let [q01, q10, q50, q90, q99] = LEVELS.map(quantile);
+    [sorted(0), sorted(count - 1), mean, variance.sqrt(), q01, q10, q50, q90, q99]
+}
+
+/// The places in a sorted column of `count` values between which the quantile of a level lies, and how far.
+pub(super) fn neighbours(level: f64, count: usize) -> (usize, usize, f64) {
+    let place = level * (count - 1) as f64;
+    (place.floor() as usize, place.ceil() as usize, place.fract())
 }
 
 #[cfg(test)]

@@ -1,16 +1,16 @@
 //! What any artefact is: kind, provenance, shapes, counts, statistics; as JSON and as words.
 
+mod datasets;
 mod recordings;
 mod text;
 
 pub use text::inspect_text;
 
-use super::dataset::{self, Dataset, TRAIN, VALIDATION};
+use super::dataset::{TRAIN, VALIDATION};
 use super::peek::{Format, format_of};
 use super::{Provenance, bytes, json_file, recording, table_file, weights};
 use crate::error::{Error, Result};
 use crate::interrupt::Interrupt;
-use crate::state::{State, action_names};
 use crate::table::{Column, Values};
 use serde_json::{Map, Value, json};
 use std::collections::BTreeSet;
@@ -65,13 +65,13 @@ fn format(path: &Path) -> Result<Format> {
 
 fn directory(path: &Path, interrupt: &Interrupt) -> Result<Value> {
     if path.join("meta").is_dir() {
-        return Ok(described_dataset(&dataset::read(path)?));
+        return datasets::one(path);
     }
     let roots: Vec<&str> = [TRAIN, VALIDATION].into_iter().filter(|name| path.join(name).is_dir()).collect();
     if !roots.is_empty() {
         let mut found = Map::from_iter([("kind".to_string(), json!("datasets"))]);
         for name in roots {
-            found.insert(name.into(), described_dataset(&dataset::read(&path.join(name))?));
+            found.insert(name.into(), datasets::one(&path.join(name))?);
         }
         return Ok(Value::Object(found));
     }
@@ -142,26 +142,6 @@ fn described_column(column: &Column) -> Value {
         fields.insert("unit".into(), json!(unit));
     }
     Value::Object(fields)
-}
-
-fn described_dataset(found: &Dataset) -> Value {
-    let lengths = || found.demos.iter().map(crate::demo::Demo::len);
-    let join =
-        |pick: fn(&crate::demo::Demo) -> &[f32]| found.demos.iter().flat_map(|d| pick(d).iter().copied()).collect::<Vec<_>>();
-    let rest = json!({
-        "task": found.task,
-        "instruction": found.task.instruction(),
-        "fps": found.fps,
-        "episodes": found.demos.len(),
-        "frames": lengths().sum::<usize>(),
-        "successes": found.successes.iter().filter(|s| **s).count(),
-        "episode_steps": statistics(lengths().map(|n| n as f64)),
-        "source_episodes": found.source_episodes,
-        "states": by_entry(&State::column_names(found.task), &join(|d| d.states())),
-        "actions": by_entry(&action_names(), &join(|d| d.actions())),
-        "executed_actions": by_entry(&action_names(), &join(|d| d.executed())),
-    });
-    answer("dataset", &found.provenance, rest)
 }
 
 fn network(path: &Path) -> Result<Value> {

@@ -7,6 +7,7 @@ use crate::error::{Error, Result};
 use crate::interrupt::Interrupt;
 use crate::state::{CONTROL_DT_S, State, action_names};
 use crate::tasks::FailureClass;
+use rayon::prelude::*;
 use serde_json::{Map, Value, json};
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -43,16 +44,48 @@ pub(super) fn all(dir: &Path, interrupt: &Interrupt) -> Result<Value> {
         return Err(Error::input(dir, "is neither a dataset nor a directory of recordings (episode-00000.mcap, ...)"));
     }
     let (mut all, mut origins) = (Counts::default(), Origins::default());
-    for file in &files {
-        interrupt.check()?;
-        let (episode, provenance) = recording::read(file)?;
-        all.add(&episode);
-        origins.add(provenance);
+    for window in files.chunks(AT_ONCE) {
+        let read = window.par_iter().map(|file| {
+            interrupt.check()?;
+            recording::read(file).map(|(episode, provenance)| (Glance::at(&episode), provenance))
+        });
+        // One after the other: of several that cannot be read the first by name is told, whatever the threads.
+        for found in read.collect::<Vec<Result<_>>>() {
+            let (glance, provenance) = found?;
+            all.add(glance);
+            origins.add(provenance);
+        }
     }
     Ok(origins.describe(all.describe()))
 }
 
-/// What is kept of each recording: a directory of them is described in the memory of one.
+/// Recordings that are read at once, on all threads; of each is kept a glance and its provenance.
+const AT_ONCE: usize = 256;
+
+/// What a description takes of an episode.
+struct Glance {
+    index: u64,
+    steps: usize,
+    reward: f64,
+    success: bool,
+    failure: Option<FailureClass>,
+    hit: bool,
+}
+
+impl Glance {
+    fn at(episode: &Episode) -> Self {
+        Glance {
+            index: episode.index,
+            steps: episode.steps.len(),
+            reward: reward(episode),
+            success: episode.success,
+            failure: episode.failure,
+            hit: moments(episode).any(|s| s.contacts.robot_obstacle),
+        }
+    }
+}
+
+/// What is kept of all recordings.
 #[derive(Default)]
 struct Counts {
     steps: Vec<f64>,
@@ -63,16 +96,16 @@ struct Counts {
 }
 
 impl Counts {
-    fn add(&mut self, episode: &Episode) {
-        self.steps.push(episode.steps.len() as f64);
-        self.rewards.push(reward(episode));
-        if let Some(class) = episode.failure {
+    fn add(&mut self, glance: Glance) {
+        self.steps.push(glance.steps as f64);
+        self.rewards.push(glance.reward);
+        if let Some(class) = glance.failure {
             *self.failures.entry(class.name()).or_default() += 1;
         }
-        if !episode.success {
-            self.failed.push(episode.index);
+        if !glance.success {
+            self.failed.push(glance.index);
         }
-        self.hit += usize::from(moments(episode).any(|s| s.contacts.robot_obstacle));
+        self.hit += usize::from(glance.hit);
     }
 
     fn describe(&self) -> Map<String, Value> {
