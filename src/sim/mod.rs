@@ -7,6 +7,8 @@ mod convert;
 mod disturbance;
 mod episode;
 mod follower;
+#[cfg(test)]
+mod free_motion_tests;
 mod physics;
 mod replay;
 mod world;
