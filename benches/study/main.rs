@@ -6,6 +6,7 @@
 //! cargo bench --bench study -- paper         # preset paper, three tasks
 //! cargo bench --bench study -- gradients --recordings DIR --dynamics FILE   # the network's answer to an action beside the simulator's
 //! cargo bench --bench study -- simulator     # accuracy and speed of the contact physics under other settings
+//! cargo bench --bench study -- replay --recordings DIR   # control steps per second of the physics alone
 //! cargo bench --bench study -- figure        # docs/pictures/few-demos.svg from the CSV
 //! cargo bench --bench study -- table         # the CSV as a markdown table; --csv names another
 //! ```
@@ -16,6 +17,7 @@ mod gradients;
 mod lab;
 mod off_track;
 mod paper;
+mod replay;
 mod results;
 mod show;
 mod simulator;
@@ -71,7 +73,7 @@ pub struct Args {
     /// figure: the picture
     #[arg(long, value_name = "FILE", default_value = "docs/pictures/few-demos.svg")]
     picture: PathBuf,
-    /// gradients: recordings to look at
+    /// gradients, replay: recordings to look at
     #[arg(long, value_name = "DIR")]
     recordings: Option<PathBuf>,
     /// gradients: the dynamics network that learned from them
@@ -89,6 +91,7 @@ enum Study {
     Paper,
     Gradients,
     Simulator,
+    Replay,
     Figure,
     Table,
 }
@@ -118,12 +121,13 @@ fn main() -> anyhow::Result<()> {
         Some(Study::Paper) => paper::run(&args),
         Some(Study::Gradients) => gradients::run(&args),
         Some(Study::Simulator) => simulator::run(&args),
+        Some(Study::Replay) => replay::run(&args),
         Some(Study::Figure) => show::figure(&args),
         Some(Study::Table) => show::table(&args),
         // `cargo bench` runs every bench: hours of training are not started by accident.
         None => {
             println!(
-                "study: name one: cargo bench --bench study -- few-demos|off-track|paper|gradients|simulator|figure|table"
+                "study: name one: cargo bench --bench study -- few-demos|off-track|paper|gradients|simulator|replay|figure|table"
             );
             Ok(())
         }
