@@ -5,6 +5,8 @@
 //! cargo bench --bench study -- off-track     # BC and HIL in scenes that their demos do not show, and with demos that do
 //! cargo bench --bench study -- paper         # preset paper, three tasks
 //! cargo bench --bench study -- gradients --recordings DIR --dynamics FILE   # the network's answer to an action beside the simulator's
+//! cargo bench --bench study -- simulator     # accuracy and speed of the contact physics under other settings
+//! cargo bench --bench study -- replay --recordings DIR   # control steps per second of the physics alone
 //! cargo bench --bench study -- figure        # docs/pictures/few-demos.svg from the CSV
 //! cargo bench --bench study -- table         # the CSV as a markdown table; --csv names another
 //! ```
@@ -15,8 +17,11 @@ mod gradients;
 mod lab;
 mod off_track;
 mod paper;
+mod replay;
 mod results;
 mod show;
+mod simulator;
+mod trials;
 
 use clap::{Parser, ValueEnum};
 use std::path::PathBuf;
@@ -44,10 +49,10 @@ pub struct Args {
     /// Methods: bc, sc, hil [default: all; off-track: bc and hil; paper: hil]
     #[arg(long, value_delimiter = ',')]
     methods: Vec<chain::Method>,
-    /// Names of off-track pipelines [default: all]
+    /// Names of off-track pipelines, or of settings of the simulator [default: all]
     #[arg(long, value_delimiter = ',')]
     variations: Vec<String>,
-    /// Unseen episodes of each evaluation
+    /// Unseen episodes of each evaluation; simulator: episodes of a cell, at most 100
     #[arg(long, default_value_t = 500)]
     episodes: u64,
     /// few-demos, off-track: the ordinary pipeline
@@ -68,7 +73,7 @@ pub struct Args {
     /// figure: the picture
     #[arg(long, value_name = "FILE", default_value = "docs/pictures/few-demos.svg")]
     picture: PathBuf,
-    /// gradients: recordings to look at
+    /// gradients, replay: recordings to look at
     #[arg(long, value_name = "DIR")]
     recordings: Option<PathBuf>,
     /// gradients: the dynamics network that learned from them
@@ -85,6 +90,8 @@ enum Study {
     OffTrack,
     Paper,
     Gradients,
+    Simulator,
+    Replay,
     Figure,
     Table,
 }
@@ -113,11 +120,15 @@ fn main() -> anyhow::Result<()> {
         Some(Study::OffTrack) => off_track::run(&args),
         Some(Study::Paper) => paper::run(&args),
         Some(Study::Gradients) => gradients::run(&args),
+        Some(Study::Simulator) => simulator::run(&args),
+        Some(Study::Replay) => replay::run(&args),
         Some(Study::Figure) => show::figure(&args),
         Some(Study::Table) => show::table(&args),
         // `cargo bench` runs every bench: hours of training are not started by accident.
         None => {
-            println!("study: name one: cargo bench --bench study -- few-demos|off-track|paper|gradients|figure|table");
+            println!(
+                "study: name one: cargo bench --bench study -- few-demos|off-track|paper|gradients|simulator|replay|figure|table"
+            );
             Ok(())
         }
     }

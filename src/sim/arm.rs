@@ -4,7 +4,7 @@ use super::contacts::Owner;
 use super::convert::{isometry, vector};
 use crate::robot::jaco::{JOINT_SPECS, LINK_INERTIA, LINKS, TORQUE_LIMITS_N_M};
 use crate::robot::{Arm, LINK_SHAPES, POSITION_LIMITS_RAD, Shape};
-use crate::state::{ARM_JOINTS, Action, JOINTS};
+use crate::state::{ARM_JOINTS, Action, CONTROL_DT_S, JOINTS};
 use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 use rapier3d::prelude::*;
 use std::f64::consts::{FRAC_PI_2, TAU};
@@ -18,6 +18,8 @@ const DAMPING_N_M_S: [Real; 2] = [0.1, 0.01];
 /// Dry friction \[N m\], arm and fingers: the fingers' worm drives cannot be pushed back; without it two fingers push the thumb open.
 /// As the solver meets it, a finger commanded slower than about 0.12 rad/s stands still.
 const DRY_FRICTION_N_M: [Real; 2] = [0.0, 0.6];
+/// Limits nearer than this are looked at \[rad\]: twice what a motor turns in a control step, beside what the joint's own velocity makes.
+const LIMIT_MARGIN_RAD: Real = 0.1;
 /// Friction coefficient of the robot's surfaces and of the fixed things; the block's own multiplies it.
 pub(super) const SURFACE_FRICTION: Real = 1.0;
 
@@ -50,12 +52,21 @@ pub(super) fn insert(physics: &mut PhysicsWorld, q: &[f64; JOINTS], dq: &[f64; J
     handle
 }
 
-/// Sets the motors' velocities \[rad/s\].
+/// Sets the motors' velocities \[rad/s\], and which limits are looked at: a limit that no joint can reach in this control step is left
+/// out, for it would be a row that holds nothing, factored and swept in every substep.
 pub(super) fn command(physics: &mut PhysicsWorld, arm: MultibodyJointHandle, action: &Action) {
     let multibody = physics.multibody_joints.get_mut(arm).expect("the robot is never removed").0;
     for (i, velocity) in action.iter().enumerate() {
+        let reach = LIMIT_MARGIN_RAD + CONTROL_DT_S as Real * multibody.generalized_velocity()[i].abs();
         let link = multibody.link_mut(i + 1).expect("link i + 1 hangs on joint i");
-        link.joint.data.set_motor_velocity(JointAxis::AngX, *velocity as Real, MOTOR_GAIN);
+        let angle = link.joint.coords()[JointAxis::AngX as usize];
+        let joint = &mut link.joint.data;
+        joint.set_motor_velocity(JointAxis::AngX, *velocity as Real, MOTOR_GAIN);
+        if !is_continuous(i) {
+            let limits = joint.limits[JointAxis::AngX as usize];
+            let near = angle - reach < limits.min || angle + reach > limits.max;
+            joint.limit_axes.set(JointAxesMask::ANG_X, near);
+        }
     }
 }
 
@@ -104,8 +115,13 @@ fn joint(kinematics: &Arm, i: usize) -> GenericJoint {
         .motor_max_force(JointAxis::AngX, TORQUE_LIMITS_N_M[i] as Real)
         .contacts_enabled(false);
     let [low, high] = POSITION_LIMITS_RAD[i];
-    let continuous = high - low > TAU;
-    if continuous { builder.build() } else { builder.limits(JointAxis::AngX, [low as Real, high as Real]).build() }
+    if is_continuous(i) { builder.build() } else { builder.limits(JointAxis::AngX, [low as Real, high as Real]).build() }
+}
+
+/// Whether joint `i` turns without limit.
+fn is_continuous(i: usize) -> bool {
+    let [low, high] = POSITION_LIMITS_RAD[i];
+    high - low > TAU
 }
 
 #[cfg(test)]

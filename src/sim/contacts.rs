@@ -2,10 +2,13 @@
 
 use crate::demo::Contacts;
 use crate::robot::jaco::HAND_LINK;
+use rapier3d::parry::bounding_volume::BoundingVolume;
 use rapier3d::prelude::{Collider, ContactPair, PhysicsWorld, Pose};
 
 /// Surfaces this near touch although no force was exchanged yet \[m\] (a world that was just set).
 const TOUCH_M: f32 = 1e-4;
+/// Nothing that is farther from the robot comes to it within a control step \[m\]: 36 deg/s on a lever of 0.9 m make 3 cm.
+const NEAR_M: f32 = 0.04;
 
 /// Whom a collider belongs to; kept in rapier's user data, so that a snapshot carries it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -63,6 +66,14 @@ pub(super) fn read(physics: &PhysicsWorld) -> Contacts {
         }
     }
     contacts
+}
+
+/// Whether something comes near the moving part of the robot, by boxes around both.
+pub(super) fn robot_near(physics: &PhysicsWorld) -> bool {
+    let all = || physics.colliders.iter().map(|(_, collider)| (Owner::of(collider), collider));
+    let others = || all().filter(|(owner, _)| !matches!(owner, Owner::Link(_)));
+    let links = all().filter(|(owner, _)| matches!(owner, Owner::Link(1..)));
+    links.map(|(_, link)| link.compute_aabb().loosened(NEAR_M)).any(|b| others().any(|(_, o)| b.intersects(&o.compute_aabb())))
 }
 
 /// Normal force of the pair, mean over the last physics step \[N\].

@@ -7,11 +7,15 @@ mod convert;
 mod disturbance;
 mod episode;
 mod follower;
+#[cfg(test)]
+mod free_motion_tests;
+mod physics;
 mod replay;
 mod world;
 
 pub use disturbance::Disturbance;
 pub use episode::{Controller, run_episode};
 pub use follower::Follower;
+pub use physics::{Grain, Physics};
 pub use replay::reexecute;
 pub use world::World;

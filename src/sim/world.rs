@@ -3,35 +3,28 @@
 use super::arm::{self, SURFACE_FRICTION};
 use super::contacts::{self, Owner};
 use super::convert::{pose, to_pose, vector};
+use super::physics::{Grain, Physics};
 use crate::error::{Error, Result};
 use crate::robot::kinematics::tool_of;
 use crate::robot::{Arm, LinkPoses, READY_Q_RAD};
 use crate::scene::{BLOCK_EDGE_M, Scene};
-use crate::state::{Action, CONTROL_DT_S, Context, JOINTS, Pose, State};
+use crate::state::{Action, Context, JOINTS, Pose, State};
 use crate::tasks::Observation;
 use rapier3d::prelude::*;
 use serde::{Deserialize, Serialize};
 
-/// Physics steps in a control step.
-const PHYSICS_STEPS: usize = 2;
 /// Gravity \[m/s^2\].
 const GRAVITY_M_S2: Real = 9.81;
-/// Substeps of a physics step, 6.25 ms each (measured under noise of 0.1 rad/s, ten times the paper's variance: stacks 90 of 100; 3 substeps: 64).
-const SOLVER_ITERATIONS: usize = 4;
-/// Sweeps over all constraints in a substep (8 stack as many and cost a fifth more time; 2 lose one grasp in seven).
-const SWEEPS: usize = 6;
-/// Contact spring, natural frequency \[Hz\] and damping ratio: penetration below 1 mm under a grasp (rapier's 30 Hz: 5 mm).
-const CONTACT_HZ: Real = 200.0;
-const CONTACT_DAMPING: Real = 2.0;
-/// Contacts of a pair that moved less than this are kept \[m\].
-const RECYCLE_M: Real = 0.002;
 /// Half extents of the table, a box whose top is the plane z = 0 \[m\]: beyond the arm's reach, too thick to fall through.
 const TABLE_HALF_M: [f64; 3] = [1.5, 1.5, 0.25];
+/// A block that moves slower rests \[m/s\].
+const REST_M_S: Real = 0.005;
 
 /// The simulated scene. Stepping it depends on nothing but its own state and the actions.
 #[derive(Serialize, Deserialize)]
 pub struct World {
     scene: Scene,
+    settings: Physics,
     physics: PhysicsWorld,
     robot: MultibodyJointHandle,
     block: RigidBodyHandle,
@@ -45,12 +38,18 @@ pub struct World {
 impl World {
     /// The start of an episode: the arm at rest in its ready pose, block and base block standing where the scene has them.
     pub fn new(scene: &Scene) -> World {
-        World::at(scene, &State { q_rad: READY_Q_RAD, dq_rad_s: [0.0; JOINTS], block: scene.block, context: scene.context })
+        World::with(scene, Physics::default())
     }
 
-    fn at(scene: &Scene, state: &State) -> World {
+    /// The same under other settings of the physics.
+    pub fn with(scene: &Scene, settings: Physics) -> World {
+        let start = State { q_rad: READY_Q_RAD, dq_rad_s: [0.0; JOINTS], block: scene.block, context: scene.context };
+        World::at(scene, &start, settings)
+    }
+
+    fn at(scene: &Scene, state: &State, settings: Physics) -> World {
         let mut physics = PhysicsWorld::new();
-        physics.integration_parameters = IntegrationParameters { dt: 0.0, ..parameters() };
+        physics.integration_parameters = IntegrationParameters { dt: 0.0, ..settings.parameters(settings.near) };
         physics.gravity = Vector::new(0.0, 0.0, -GRAVITY_M_S2);
         insert_fixed(&mut physics, Owner::Table, [0.0, 0.0, -TABLE_HALF_M[2]], TABLE_HALF_M);
         for obstacle in &scene.obstacles {
@@ -64,9 +63,10 @@ impl World {
         let robot = arm::insert(&mut physics, &state.q_rad, &state.dq_rad_s);
         // A step of no duration finds the contacts and moves nothing.
         physics.step();
-        physics.integration_parameters = parameters();
+        physics.integration_parameters = settings.parameters(settings.near);
         World {
             scene: scene.clone(),
+            settings,
             physics,
             robot,
             block,
@@ -79,9 +79,19 @@ impl World {
     /// One control step of 50 ms with the joint velocities `executed` \[rad/s\] (used in f32).
     pub fn step(&mut self, executed: &Action) {
         arm::command(&mut self.physics, self.robot, executed);
-        for _ in 0..PHYSICS_STEPS {
+        let grain = self.grain();
+        self.physics.integration_parameters = self.settings.parameters(grain);
+        for _ in 0..grain.steps {
             self.physics.step();
         }
+    }
+
+    /// How finely the next control step is divided.
+    fn grain(&self) -> Grain {
+        let Physics { near, free, .. } = self.settings;
+        let moves = |handle: &RigidBodyHandle| self.physics.bodies[*handle].linvel().length() > REST_M_S;
+        let near_all = near == free || contacts::robot_near(&self.physics) || self.base.iter().chain([&self.block]).any(moves);
+        if near_all { near } else { free }
     }
 
     /// What there is to see now. Forces are those of the physics step that led here (0 in a world that was just made or set).
@@ -113,7 +123,7 @@ impl World {
     /// differs from the recorded one by about half a millimetre.
     pub fn set_state(&mut self, state: &State) {
         let scene = Scene { context: state.context, ..self.scene.clone() };
-        *self = World::at(&scene, state);
+        *self = World::at(&scene, state, self.settings);
     }
 
     /// Everything that the future depends on, as bytes.
@@ -128,21 +138,6 @@ impl World {
     pub fn restore(bytes: &[u8]) -> Result<World> {
         postcard::from_bytes(bytes)
             .map_err(|e| Error::Failed(format!("{} bytes are no snapshot of a world by this version of hilt: {e}", bytes.len())))
-    }
-}
-
-fn parameters() -> IntegrationParameters {
-    let softness = SpringCoefficients::new(CONTACT_HZ, CONTACT_DAMPING);
-    IntegrationParameters {
-        dt: (CONTROL_DT_S / PHYSICS_STEPS as f64) as Real,
-        num_solver_iterations: SOLVER_ITERATIONS,
-        num_internal_pgs_iterations: SWEEPS,
-        num_internal_stabilization_iterations: 1,
-        contact_softness: softness,
-        static_contact_softness: softness,
-        friction_in_bias_pass: false,
-        normalized_contact_recycle_distance: RECYCLE_M,
-        ..IntegrationParameters::default()
     }
 }
 

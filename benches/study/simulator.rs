@@ -1,0 +1,99 @@
+//! What accuracy and speed the settings of the contact physics give: one line for each.
+
+use super::Args;
+use super::trials::{End, Errors, episode, errors, plans, steps_per_s};
+use anyhow::{Result, ensure};
+use hilt::config::SimulateSettings;
+use hilt::sim::{Grain, Physics};
+use hilt::tasks::{FailureClass, Task};
+use std::io::{Write, stdout};
+
+/// Ten times the variance of the noise: what is just good enough elsewhere fails here.
+const MORE_NOISE: f64 = 10.0;
+/// Episodes of each task whose steps are timed, and how often, the settings in turns: the best counts.
+const TIMED: usize = 5;
+const ROUNDS: usize = 7;
+/// Most episodes of a cell.
+const MOST_EPISODES: u64 = 100;
+
+/// Everything in control steps divided like this.
+fn all(steps: usize, substeps: usize, sweeps: usize) -> Physics {
+    let grain = Grain { steps, substeps, sweeps };
+    Physics { near: grain, free: grain, ..Physics::default() }
+}
+
+/// The default near things, this where nothing can touch.
+fn free(steps: usize, substeps: usize, sweeps: usize) -> Physics {
+    Physics { free: Grain { steps, substeps, sweeps }, ..Physics::default() }
+}
+
+/// The settings under study by name; steps x substeps x sweeps.
+fn candidates() -> Vec<(&'static str, Physics)> {
+    let default = Physics::default();
+    vec![
+        ("default", default),
+        ("4 x 8 x 24", all(4, 8, 24)),
+        ("2 x 8 x 6", all(2, 8, 6)),
+        ("2 x 4 x 8", all(2, 4, 8)),
+        ("2 x 4 x 6", all(2, 4, 6)),
+        ("2 x 4 x 4", all(2, 4, 4)),
+        ("2 x 4 x 3", all(2, 4, 3)),
+        ("2 x 3 x 6", all(2, 3, 6)),
+        ("2 x 3 x 8", all(2, 3, 8)),
+        ("2 x 2 x 6", all(2, 2, 6)),
+        ("1 x 8 x 6", all(1, 8, 6)),
+        ("1 x 6 x 6", all(1, 6, 6)),
+        ("1 x 4 x 6", all(1, 4, 6)),
+        ("free 2 x 2 x 6", free(2, 2, 6)),
+        ("free 1 x 4 x 6", free(1, 4, 6)),
+        ("free 1 x 2 x 6", free(1, 2, 6)),
+        ("free 1 x 1 x 6", free(1, 1, 6)),
+        ("no relaxation", Physics { relaxations: 0, ..default }),
+        ("prediction 5 mm", Physics { prediction_m: 0.005, ..default }),
+        ("recycle 10 mm", Physics { recycle_m: 0.01, ..default }),
+        ("contact 100 Hz", Physics { contact_hz: 100.0, ..default }),
+        ("contact 400 Hz", Physics { contact_hz: 400.0, ..default }),
+        ("no sweeps of fast bodies", Physics { continuous: false, ..default }),
+    ]
+}
+
+/// Prints the table.
+pub fn run(args: &Args) -> Result<()> {
+    let count = args.episodes.min(MOST_EPISODES);
+    let chosen = |name: &str| args.variations.is_empty() || args.variations.iter().any(|v| v == name);
+    let candidates: Vec<_> = candidates().into_iter().filter(|(name, _)| chosen(name)).collect();
+    ensure!(!candidates.is_empty(), "--variations names no setting: the first column of the whole table does");
+    let planned = Task::ALL.map(|task| plans(task, count));
+    let timed: Vec<_> = planned.iter().flat_map(|plans| plans.iter().take(TIMED).cloned()).collect();
+    let mut speeds = vec![0.0f64; candidates.len()];
+    for _ in 0..ROUNDS {
+        for ((_, physics), best) in candidates.iter().zip(&mut speeds) {
+            *best = best.max(steps_per_s(&timed, *physics));
+        }
+    }
+    println!(
+        "| settings | steps/s | hold mm | swing mm | drift um | rammed mm | tracking mrad | pick-up | place | stack | stack, noise x 10 |"
+    );
+    println!("|{}", "---|".repeat(11));
+    let usual = SimulateSettings::default().noise_variance;
+    for ((name, physics), speed) in candidates.iter().zip(speeds) {
+        let Errors { hold, swing, drift, penetration, tracking } = errors(*physics);
+        print!("| {name} | {speed:.0} | {:.3} | {:.3} | {:.1} |", 1e3 * hold, 1e3 * swing, 1e6 * drift);
+        print!(" {:.1} | {:.3} |", 1e3 * penetration, 1e3 * tracking);
+        for (plans, variance) in planned.iter().zip([usual; 3]).chain([(&planned[2], MORE_NOISE * usual)]) {
+            let ends: Vec<End> = plans.iter().map(|plan| episode(plan, *physics, variance)).collect();
+            print!(" {} |", counted(&ends));
+            stdout().flush()?;
+        }
+        println!();
+    }
+    Ok(())
+}
+
+/// "98 (1 dropped, 1 toppled)".
+fn counted(ends: &[End]) -> String {
+    let of = |class: Option<FailureClass>| ends.iter().filter(|end| end.failure == class).count();
+    let failed = FailureClass::ALL.into_iter().map(|class| (of(Some(class)), class.name())).filter(|(n, _)| *n > 0);
+    let failed: Vec<String> = failed.map(|(n, name)| format!("{n} {name}")).collect();
+    if failed.is_empty() { of(None).to_string() } else { format!("{} ({})", of(None), failed.join(", ")) }
+}

@@ -1,0 +1,193 @@
+//! What the simulator study measures under one setting of the physics: whole noisy episodes, held, swung and stacked blocks, speed.
+
+#[path = "../../tests/physics/scripted.rs"]
+#[allow(dead_code, reason = "the tests use more of it")]
+mod scripted;
+
+use hilt::config::{PlanSettings, SceneSettings, SimulateSettings};
+use hilt::math::sin_cos;
+use hilt::plan::{Plan, Planner};
+use hilt::robot::Arm;
+use hilt::scene::{BLOCK_EDGE_M, Scene};
+use hilt::seed::stream;
+use hilt::sim::{Controller, Disturbance, Follower, Physics, World};
+use hilt::state::{ARM_JOINTS, Action, CONTROL_DT_S, CONTROL_HZ, Context, JOINTS, Pose};
+use hilt::tasks::{FailureClass, Monitor, Observation, Task, draw_scene};
+use nalgebra::{Point3, Vector3};
+use scripted::Script;
+use std::f64::consts::TAU;
+use std::fs;
+use std::sync::LazyLock;
+use std::time::Instant;
+
+/// Positions and yaws of the scripted trials.
+const POSITIONS: u64 = 20;
+/// Control steps of 5 s.
+const FIVE_SECONDS: usize = 5 * CONTROL_HZ as usize;
+/// Joint 1 swings with this amplitude \[rad/s\] and period \[s\]: the hand accelerates with up to 0.6 m/s^2.
+const SWING_RAD_S: f64 = 0.5;
+const SWING_PERIOD_S: f64 = 2.0;
+/// The fingers go on closing \[rad/s\].
+const GRIP_RAD_S: f64 = 0.3;
+/// How deep under the table the ramming script wants the tool \[m\].
+const RAM_M: f64 = -0.15;
+
+/// `count` planned scenes of a task.
+pub fn plans(task: Task, count: u64) -> Vec<Plan> {
+    let mut planner = Planner::new(&PlanSettings::default());
+    let settings = SceneSettings::default();
+    let scenes = (0..count).map(|i| draw_scene(task, &settings, &mut stream(0, "scene", i)).expect("the default area has room"));
+    let plan = |(i, scene)| planner.plan(i, &scene, &mut stream(0, "plan", i)).expect("every default scene has a plan");
+    (0..count).zip(scenes).map(plan).collect()
+}
+
+/// How an episode ended, and after how many control steps.
+pub struct End {
+    pub failure: Option<FailureClass>,
+    pub steps: usize,
+}
+
+/// A plan followed under noise.
+pub fn episode(plan: &Plan, physics: Physics, noise_variance: f64) -> End {
+    let settings = SimulateSettings { noise_variance, ..SimulateSettings::default() };
+    let mut disturbance = Disturbance::new(&settings, stream(0, "simulate.noise", plan.index));
+    let mut follower = Follower::new(plan).expect("a whole plan");
+    let mut world = World::with(&plan.scene, physics);
+    let mut monitor = Monitor::new(&plan.scene);
+    let mut seen = world.observe();
+    let mut steps = 0;
+    while !monitor.update(&seen).success {
+        if steps == settings.max_steps as usize || seen.state.block.position_m[2] < 0.0 {
+            return End { failure: Some(monitor.classify(&seen)), steps };
+        }
+        world.step(&disturbance.apply(&follower.command(&seen)));
+        seen = world.observe();
+        steps += 1;
+    }
+    End { failure: None, steps }
+}
+
+/// Processor time of this thread \[s\]; wall time where the system does not tell.
+pub fn processor_s() -> f64 {
+    static SINCE: LazyLock<Instant> = LazyLock::new(Instant::now);
+    let text = fs::read_to_string("/proc/thread-self/schedstat").unwrap_or_default();
+    let own = text.split_whitespace().next().and_then(|ns| ns.parse::<f64>().ok());
+    own.map_or_else(|| SINCE.elapsed().as_secs_f64(), |ns| 1e-9 * ns)
+}
+
+/// Control steps per second of processor time over whole episodes.
+pub fn steps_per_s(plans: &[Plan], physics: Physics) -> f64 {
+    let start = processor_s();
+    let steps: usize = plans.iter().map(|plan| episode(plan, physics, SimulateSettings::default().noise_variance).steps).sum();
+    steps as f64 / (processor_s() - start)
+}
+
+/// How far things move that should not, the worst of all positions \[m\].
+pub struct Errors {
+    /// The block in the hand, held still for 5 s.
+    pub hold: f64,
+    /// The same while the arm swings.
+    pub swing: f64,
+    /// A stacked block in 5 s, the arm in its ready pose.
+    pub drift: f64,
+    /// How deep the block is rammed into the table.
+    pub penetration: f64,
+    /// A joint of the arm from where its command leads, in one control step of free motion \[rad\].
+    pub tracking: f64,
+}
+
+/// All scripted trials.
+pub fn errors(physics: Physics) -> Errors {
+    let mut worst = Errors { hold: 0.0, swing: 0.0, drift: 0.0, penetration: 0.0, tracking: 0.0 };
+    let settings = SceneSettings { yaw: true, ..SceneSettings::default() };
+    for index in 0..POSITIONS {
+        let scene = |task| draw_scene(task, &settings, &mut stream(7, "study", index)).expect("the default area has room");
+        let [hold, swing] = slips(&scene(Task::PickUp), physics);
+        worst.hold = worst.hold.max(hold);
+        worst.swing = worst.swing.max(swing);
+        worst.drift = worst.drift.max(drift(scene(Task::Stack), physics));
+        worst.penetration = worst.penetration.max(rammed(&scene(Task::PickUp), physics));
+        worst.tracking = worst.tracking.max(tracking(scene(Task::PickUp), physics, index));
+    }
+    worst
+}
+
+/// The block's centre as the hand sees it.
+fn in_hand(arm: &Arm, seen: &Observation) -> Vector3<f64> {
+    arm.tool_pose(&seen.state.q_rad).inverse_transform_point(&Point3::from(seen.state.block.position_m)).coords
+}
+
+/// Slip in a hold, then in a swing.
+fn slips(scene: &Scene, physics: Physics) -> [f64; 2] {
+    let (arm, mut world, mut script) = (Arm::new(), World::with(scene, physics), Script::lift(&scene.block));
+    let mut rested = 0;
+    while rested < FIVE_SECONDS / 2 {
+        rested += usize::from(script.on_last_leg());
+        let seen = world.observe();
+        world.step(&script.command(&seen));
+    }
+    let slip = |world: &mut World, command: &mut dyn FnMut(usize, &Observation) -> Action| {
+        let before = in_hand(&arm, &world.observe());
+        for step in 0..FIVE_SECONDS {
+            let seen = world.observe();
+            world.step(&command(step, &seen));
+        }
+        (in_hand(&arm, &world.observe()) - before).norm()
+    };
+    let hold = slip(&mut world, &mut |_, seen| script.command(seen));
+    let swing = slip(&mut world, &mut |step, _| {
+        let speed = SWING_RAD_S * sin_cos(TAU * step as f64 * CONTROL_DT_S / SWING_PERIOD_S).0;
+        std::array::from_fn(|i| {
+            if i == 0 {
+                speed
+            } else if i < ARM_JOINTS {
+                0.0
+            } else {
+                GRIP_RAD_S
+            }
+        })
+    });
+    [hold, swing]
+}
+
+/// A block set on the base block.
+fn drift(mut scene: Scene, physics: Physics) -> f64 {
+    let Context::Base(base) = scene.context else { return 0.0 };
+    let [x, y, z] = base.position_m;
+    scene.block = Pose { position_m: [x + 0.005, y - 0.005, z + BLOCK_EDGE_M], ..scene.block };
+    let mut world = World::with(&scene, physics);
+    for _ in 0..FIVE_SECONDS {
+        world.step(&[0.0; JOINTS]);
+    }
+    (Vector3::from(world.observe().state.block.position_m) - Vector3::from(scene.block.position_m)).norm()
+}
+
+/// Depth of the block's lowest corner while the hand presses it down.
+fn rammed(scene: &Scene, physics: Physics) -> f64 {
+    let (mut world, mut script) = (World::with(scene, physics), Script::lift(&scene.block));
+    script.legs[1].tool_m[2] = RAM_M;
+    let mut deepest: f64 = 0.0;
+    for _ in 0..FIVE_SECONDS {
+        let seen = world.observe();
+        let rotation = seen.state.block.isometry().rotation.to_rotation_matrix();
+        let reach: f64 = (0..3).map(|i| rotation[(2, i)].abs() * BLOCK_EDGE_M / 2.0).sum();
+        deepest = deepest.max(reach - seen.state.block.position_m[2]);
+        world.step(&script.command(&seen));
+    }
+    deepest
+}
+
+/// The arm under noise alone, the block out of its way.
+fn tracking(mut scene: Scene, physics: Physics, index: u64) -> f64 {
+    scene.block.position_m = [0.1, 0.7, BLOCK_EDGE_M / 2.0];
+    let mut noise = Disturbance::new(&SimulateSettings::default(), stream(0, "tracking", index));
+    let mut world = World::with(&scene, physics);
+    let mut worst: f64 = 0.0;
+    for _ in 0..FIVE_SECONDS {
+        let (before, action) = (world.observe().state.q_rad, noise.apply(&[0.0; JOINTS]));
+        world.step(&action);
+        let after = world.observe().state.q_rad;
+        worst = (0..ARM_JOINTS).fold(worst, |w, i| w.max((after[i] - before[i] - CONTROL_DT_S * action[i]).abs()));
+    }
+    worst
+}
