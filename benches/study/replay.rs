@@ -1,5 +1,5 @@
 //! The executed actions of recordings once more, and nothing beside: control steps per second of the physics alone, for comparison
-//! with other engines (`benches/against_mujoco.py`).
+//! with other engines (`benches/peers/mujoco.py`).
 
 use super::Args;
 use super::trials::processor_s;

@@ -3,7 +3,7 @@
     pip install mujoco mcap-protobuf-support
     hilt plan --task stack --episodes 20 --out target/peer/plans.parquet
     hilt simulate --task stack --plans target/peer/plans.parquet --out target/peer/recordings
-    python benches/against_mujoco.py target/peer/recordings
+    python benches/peers/mujoco.py target/peer/recordings
 
 Both get the same robot (the recording's own URDF: links, inertia, primitives, limits), blocks, torque limits, armature, damping and dry
 friction, and the same joint velocities for 50 ms each; both do nothing else in between. The contact models differ, so the block ends
