@@ -201,7 +201,7 @@ qemu: build ## the same bytes as processors with and without FMA, all kernels, a
 	tests/qemu.sh
 
 bench: need-cargo ## measure planner, simulator and training
-	cargo bench --locked
+	cargo bench --locked --bench plan --bench simulate --bench hil
 
 fuzz: need-cargo ## give every reader of files mutated inputs, INPUTS of them (200000), and count what goes wrong
 	cargo bench --locked --bench fuzz -- --inputs $(or $(INPUTS),200000)

@@ -4,6 +4,9 @@
 //! of the two networks count as operations: not tanh, features, losses or Adam, nor idle lanes, nor the first steps that behavior cloning
 //! has already done. Prints a table in Markdown.
 
+#[allow(dead_code, reason = "the other benches use more of it")]
+mod common;
+
 use hilt::config::{PretrainSettings, TrainSettings};
 use hilt::demo::Demo;
 use hilt::interrupt::Interrupt;
@@ -159,9 +162,8 @@ fn main() {
     for (width, peak) in peak_flops() {
         println!("peak of one core in registers of {} bits: {:.1} GFLOP/s", 32 * width, peak / 1e9);
     }
-    println!(
-        "\n| update | threads | ms | GFLOP/s in matrix products | of the peak | times one thread |\n|---|---|---|---|---|---|"
-    );
+    println!();
+    common::head(&["update", "threads", "ms", "GFLOP/s in matrix products", "of the peak", "times one thread"]);
     let mut yardstick = Yardstick::default();
     for threads in [1, 2] {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads start");

@@ -1,26 +1,30 @@
-//! Time of a complete plan, per task: `cargo bench --bench plan`. Each sample plans the next of many random scenes.
+//! Time of a complete plan, per task: `cargo bench --bench plan`. Each repetition plans the next of many random scenes, on one thread.
+//! Prints a table in Markdown.
 
-use criterion::{Criterion, criterion_group, criterion_main};
+mod common;
+
 use hilt::config::{PlanSettings, SceneSettings};
 use hilt::plan::Planner;
 use hilt::seed::stream;
 use hilt::tasks::{Task, draw_scene};
 
-fn plans(c: &mut Criterion) {
+/// Scenes of a task.
+const SCENES: usize = 200;
+/// Share of the plans that take no longer than the slow one shown.
+const SLOW: f64 = 0.95;
+
+fn main() {
+    common::head(&["plan", "median ms", "95th percentile ms"]);
     for task in Task::ALL {
         let mut planner = Planner::new(&PlanSettings::default());
         let mut index = 0;
-        c.bench_function(&format!("plan {task}"), |b| {
-            b.iter(|| {
-                let scene = draw_scene(task, &SceneSettings::default(), &mut stream(0, "scene", index))
-                    .expect("the default area has room");
-                let plan = planner.plan(index, &scene, &mut stream(0, "plan", index)).expect("every default scene has a plan");
-                index += 1;
-                plan
-            });
+        let seconds = common::seconds(SCENES, || {
+            let scene =
+                draw_scene(task, &SceneSettings::default(), &mut stream(0, "scene", index)).expect("the default area has room");
+            planner.plan(index, &scene, &mut stream(0, "plan", index)).expect("every default scene has a plan");
+            index += 1;
         });
+        let slow = seconds[(SLOW * SCENES as f64) as usize];
+        println!("| {task} | {:.2} | {:.2} |", 1e3 * common::median(&seconds), 1e3 * slow);
     }
 }
-
-criterion_group!(benches, plans);
-criterion_main!(benches);

@@ -1,10 +1,11 @@
 //! Control steps per second and core: a whole noisy stack episode, and its hardest part, a block held while the arm moves.
+//! Prints a table in Markdown.
 
+mod common;
 #[path = "../tests/physics/scripted.rs"]
 #[allow(dead_code, reason = "the tests use more of it")]
 mod scripted;
 
-use criterion::{BatchSize, Criterion, Throughput, criterion_group, criterion_main};
 use hilt::config::{SceneSettings, SimulateSettings};
 use hilt::interrupt::Interrupt;
 use hilt::scene::Scene;
@@ -13,6 +14,8 @@ use hilt::state::{ARM_JOINTS, Action};
 use hilt::tasks::{Task, draw_scene};
 use scripted::Script;
 
+/// Repetitions of each.
+const REPETITIONS: usize = 60;
 /// Control steps of a measured stretch: 2 s of simulated time.
 const STRETCH: u32 = 40;
 /// Joint 1 swings with this speed \[rad/s\]; the fingers keep closing with the other.
@@ -36,7 +39,7 @@ fn holding() -> World {
     world
 }
 
-fn held_block(c: &mut Criterion) {
+fn held_block() -> Vec<f64> {
     let start = holding().snapshot();
     let restored = || World::restore(&start).expect("a snapshot made just now");
     let action: Action = std::array::from_fn(|i| match i {
@@ -47,15 +50,13 @@ fn held_block(c: &mut Criterion) {
     let stretch =
         |world: &mut World| (0..STRETCH).fold(true, |held, _| (world.step(&action), held & world.observe().gripped()).1);
     assert!(stretch(&mut restored()), "the block stays in the hand");
-    let mut group = c.benchmark_group("control steps");
-    group.throughput(Throughput::Elements(u64::from(STRETCH)));
-    group.bench_function("held block, arm moving", |b| {
-        b.iter_batched(restored, |mut world| stretch(&mut world), BatchSize::SmallInput);
-    });
-    group.finish();
+    let mut worlds: Vec<World> = (0..REPETITIONS).map(|_| restored()).collect();
+    common::seconds(REPETITIONS, || {
+        stretch(&mut worlds.pop().expect("a world each"));
+    })
 }
 
-fn whole_episode(c: &mut Criterion) {
+fn whole_episode() -> (usize, Vec<f64>) {
     let scene = stack_scene();
     let settings = SimulateSettings::default();
     let run = || {
@@ -64,11 +65,16 @@ fn whole_episode(c: &mut Criterion) {
         run_episode(0, &scene, &mut script, &mut noise, settings.max_steps, &Interrupt::default()).expect("not interrupted")
     };
     let steps = run().steps.len();
-    let mut group = c.benchmark_group("control steps");
-    group.throughput(Throughput::Elements(steps as u64));
-    group.bench_function("whole stack episode", |b| b.iter(run));
-    group.finish();
+    (steps, common::seconds(REPETITIONS, || drop(run())))
 }
 
-criterion_group!(benches, held_block, whole_episode);
-criterion_main!(benches);
+fn main() {
+    common::head(&["simulation on one core", "control steps", "steps/s, fastest", "steps/s, median"]);
+    let row = |name: &str, steps: usize, seconds: &[f64]| {
+        let rate = |seconds: f64| steps as f64 / seconds;
+        println!("| {name} | {steps} | {:.0} | {:.0} |", rate(seconds[0]), rate(common::median(seconds)));
+    };
+    row("block held, arm moving", STRETCH as usize, &held_block());
+    let (steps, seconds) = whole_episode();
+    row("whole stack episode", steps, &seconds);
+}
