@@ -49,6 +49,8 @@ fn candidates() -> Vec<(&'static str, Physics)> {
         ("free 1 x 1 x 6", free(1, 1, 6)),
         ("no relaxation", Physics { relaxations: 0, ..default }),
         ("prediction 5 mm", Physics { prediction_m: 0.005, ..default }),
+        ("prediction 10 mm", Physics { prediction_m: 0.01, ..default }),
+        ("free 1 x 2 x 6 and prediction 10 mm", Physics { prediction_m: 0.01, ..free(1, 2, 6) }),
         ("recycle 10 mm", Physics { recycle_m: 0.01, ..default }),
         ("contact 100 Hz", Physics { contact_hz: 100.0, ..default }),
         ("contact 400 Hz", Physics { contact_hz: 400.0, ..default }),

@@ -7,7 +7,8 @@ mod scripted;
 use hilt::config::{PlanSettings, SceneSettings, SimulateSettings};
 use hilt::math::sin_cos;
 use hilt::plan::{Plan, Planner};
-use hilt::robot::Arm;
+use hilt::robot::jaco::HAND_LINK;
+use hilt::robot::{Arm, LINK_SHAPES, Shape};
 use hilt::scene::{BLOCK_EDGE_M, Scene};
 use hilt::seed::stream;
 use hilt::sim::{Controller, Disturbance, Follower, Physics, World};
@@ -99,7 +100,7 @@ pub struct Errors {
     pub swing: [f64; 2],
     /// A stacked block in 5 s, the arm in its ready pose.
     pub drift: [f64; 2],
-    /// How deep the block is rammed into the table.
+    /// How deep the fingers are rammed into the table.
     pub rammed: [f64; 2],
     /// A joint of the arm from where its command leads, in one control step of free motion \[rad\].
     pub tracking: [f64; 2],
@@ -165,17 +166,20 @@ fn drift(mut scene: Scene, physics: Physics) -> f64 {
     (Vector3::from(world.observe().state.block.position_m) - Vector3::from(scene.block.position_m)).norm()
 }
 
-/// Depth of the block's lowest corner while the hand presses it down.
+/// Depth of a finger's lowest corner while the hand presses the fingers onto the table.
 fn rammed(scene: &Scene, physics: Physics) -> f64 {
     let (mut world, mut script) = (World::with(scene, physics), Script::lift(&scene.block));
-    script.legs[0].tool_m[2] = 0.12;
     script.legs[1].tool_m[2] = RAM_M;
     let mut deepest: f64 = 0.0;
     for _ in 0..2 * FIVE_SECONDS {
-        let seen = world.observe();
-        let rotation = seen.state.block.isometry().rotation.to_rotation_matrix();
-        let reach: f64 = (0..3).map(|i| rotation[(2, i)].abs() * BLOCK_EDGE_M / 2.0).sum();
-        deepest = deepest.max(reach - seen.state.block.position_m[2]);
+        let (seen, links) = (world.observe(), world.link_poses());
+        for primitive in LINK_SHAPES.iter().filter(|primitive| primitive.link > HAND_LINK) {
+            let Shape::Box { center_m, half_m } = primitive.shape else { continue };
+            let pose = links[primitive.link];
+            let axes = pose.rotation.to_rotation_matrix();
+            let reach: f64 = (0..3).map(|i| axes[(2, i)].abs() * half_m[i]).sum();
+            deepest = deepest.max(reach - (pose * Point3::from(center_m)).z);
+        }
         world.step(&script.command(&seen));
     }
     deepest
