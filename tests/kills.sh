@@ -83,7 +83,7 @@ for ((i = 0; i < count; i++)); do
     elif [ "$finished" -gt 0 ]; then
         fault "$finished finished pieces were not used"
     fi
-    printf '%3d %-4s %4d ms into %-8s hit %-8s checkpoint %s\n' "$((i + 1))" "$signal" "$delay_ms" "$stage" "$hit" "$checkpoint"
+    printf '%3d %-4s %4d ms into %-8s hit %-8s pieces %3d checkpoint %s\n' "$((i + 1))" "$signal" "$delay_ms" "$stage" "$hit" "$finished" "$checkpoint"
     hashes "$run" | diff "$scratch/expected.txt" - > "$scratch/difference.txt" || { fault "other bytes"; cat "$scratch/difference.txt"; }
     left=$(leftovers)
     [ -z "$left" ] || fault "left over: $left"

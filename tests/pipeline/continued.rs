@@ -53,11 +53,6 @@ fn stopped(words: Vec<String>, name: &str, unfinished: &Path, count: usize) -> O
     child.wait_with_output().expect("ended")
 }
 
-/// The last of a stage's words that begin so.
-fn line<'a>(words: &'a str, begins: &str) -> &'a str {
-    words.lines().rfind(|line| line.starts_with(begins)).unwrap_or_else(|| panic!("no \"{begins}\" in {words}"))
-}
-
 #[test]
 fn killed_planning_goes_on_and_finished_blocks_are_not_planned_again() {
     let (whole, run) = (Run::new("pick-up", 0), Run::new("pick-up", 0));
@@ -99,9 +94,11 @@ fn stopped_simulation_goes_on_and_finished_episodes_are_not_executed_again() {
     let words = done(run.words("simulate"));
     assert!(words.contains("simulate: goes on: "), "{words}");
     // Kept episodes count: "24 episodes in ..." is said of this process, the rest of all.
-    let totals = |words: &str| line(words, "simulate: ").split_once(")").map(|(_, totals)| totals.to_string());
-    let of = |words: &str| words.lines().find(|line| line.contains(" control steps, ")).and_then(totals);
-    assert_eq!(of(&words), of(&all));
+    let totals = |words: &str| {
+        let line = words.lines().find(|line| line.contains(" control steps, ")).expect("the totals");
+        line.split_once(')').expect("a rate").1.to_string()
+    };
+    assert_eq!(totals(&words), totals(&all));
     for (name, was) in before {
         assert_eq!(identity(&run.at("recordings").join(&name)), was, "{name} was executed again");
     }
@@ -235,24 +232,30 @@ fn inspect_says_what_a_directory_of_pieces_is() {
 #[test]
 #[ignore = "takes a minute"]
 fn ten_kills_at_moments_of_plan_and_simulate_leave_the_bytes_of_an_undisturbed_run() {
-    const EPISODES: [&str; 2] = ["--episodes", "400"];
     const MOMENTS: u32 = 5;
-    let (whole, run) = (Run::new("pick-up", 0), Run::new("pick-up", 0));
-    for (stage, flags) in [("plan", &EPISODES[..]), ("simulate", &["--episodes", "100"])] {
+    let whole = Run::new("pick-up", 0);
+    for (stage, flags, artefact) in
+        [("plan", ["--episodes", "400"], "plans.parquet"), ("simulate", ["--episodes", "60"], "recordings")]
+    {
         let began = Instant::now();
-        done(with(&whole, stage, flags));
+        done(with(&whole, stage, &flags));
         let undisturbed = began.elapsed();
         for moment in 1..=MOMENTS {
-            let mut child = Command::new(HILT).args(with(&run, stage, flags)).arg("--quiet").spawn().expect("the binary runs");
-            // Each goes on where the one before was killed.
-            std::thread::sleep(undisturbed / (2 * MOMENTS));
+            let run = Run::new("pick-up", 0);
+            if stage == "simulate" {
+                fs::copy(whole.at("plans.parquet"), run.at("plans.parquet")).expect("copied");
+            }
+            let mut child = Command::new(HILT).args(with(&run, stage, &flags)).arg("--quiet").spawn().expect("the binary runs");
+            let wait = undisturbed * moment / (MOMENTS + 1);
+            std::thread::sleep(wait);
             child.kill().expect("killed");
             child.wait().expect("ended");
-            let kept = pieces(&run.at(format!("{}.unfinished", if stage == "plan" { "plans" } else { "recordings" }))).len();
-            println!("{stage}: kill {moment} left {kept} pieces");
+            let kept = run.at(artefact).with_extension("unfinished");
+            let (count, there) = (pieces(&kept).len(), run.at(artefact).exists());
+            let words = done(with(&run, stage, &flags));
+            assert_eq!(words.contains("goes on: "), count > 0, "{words}");
+            println!("{stage} killed after {wait:.1?} of {undisturbed:.1?}: {count} pieces kept, artefact there: {there}");
+            run.unchanged(stage, &contents(whole.path()));
         }
-        let words = done(with(&run, stage, flags));
-        println!("{}", line(&words, &format!("{stage}: goes on")));
-        run.unchanged(stage, &contents(whole.path()));
     }
 }
