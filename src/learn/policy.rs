@@ -37,7 +37,7 @@ pub struct Policy {
 impl Policy {
     /// A policy with random weights; scalings and horizon from the training demos.
     pub(super) fn new(corpus: &Corpus, settings: &TrainSettings, rng: &mut impl Rng) -> Self {
-        let features = Features::fit(corpus.task, settings.features, settings.mask_dq, &corpus.states);
+        let features = Features::fit(corpus, settings.features, settings.mask_dq);
         let mut widths = vec![settings.hidden_units; settings.hidden_layers + 2];
         (widths[0], widths[settings.hidden_layers + 1]) = (features.width(), JOINTS);
         let mut lengths: Vec<usize> = (0..corpus.demos()).map(|i| corpus.demo(i).len()).collect();
@@ -47,7 +47,7 @@ impl Policy {
             task: corpus.task,
             horizon_steps: (HORIZON_OVER_P95 * p95) as u32,
             features,
-            action: Scaling::fit(&corpus.commanded, JOINTS, ACTION_FLOOR_RAD_S),
+            action: Scaling::fit(corpus.rows(), JOINTS, ACTION_FLOOR_RAD_S, |r, row| row.copy_from_slice(corpus.commanded(r))),
             net: Mlp::new(&widths, settings.activation, rng),
             log_std: vec![ln(settings.initial_std.max(settings.std_floor)) as f32; JOINTS],
             settings: settings.clone(),
