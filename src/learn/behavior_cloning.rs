@@ -1,7 +1,8 @@
 //! Algorithm 2: behavior cloning. L_BC (Eq. 3) and the degree of policy convergence d_conv (Eq. 4) over the states of the demos.
 
-use super::corpus::{PolicySamples, Samples, row};
+use super::corpus::row;
 use super::policy::Policy;
+use super::samples::{PolicySamples, Samples};
 use super::shards;
 use crate::config::{ActionChoice, Convergence, Objective, TrainSettings};
 use crate::math::exp_f32;

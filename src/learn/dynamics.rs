@@ -232,13 +232,13 @@ fn member(i: usize) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::learn::corpus::Samples;
+    use crate::learn::samples::Samples;
     use crate::learn::testing::demos;
     use crate::seed::stream;
 
     #[test]
     fn dynamics_survive_their_tensors_and_copy_the_context() {
-        let corpus = Corpus::new(&demos(Task::Stack, 3, 20, 0), "training").expect("demos");
+        let corpus = Corpus::new(demos(Task::Stack, 3, 20, 0), "training").expect("demos");
         for structure in [Structure::Plain, Structure::Kinematic] {
             let settings = PretrainSettings { structure, ensemble: 3, ..Default::default() };
             let mut dynamics = Dynamics::new(&corpus, &settings, &mut stream(0, "test", 0));
@@ -252,7 +252,7 @@ mod tests {
 
     #[test]
     fn a_description_out_of_its_limits_is_refused() {
-        let corpus = Corpus::new(&demos(Task::Stack, 3, 20, 0), "training").expect("demos");
+        let corpus = Corpus::new(demos(Task::Stack, 3, 20, 0), "training").expect("demos");
         let dynamics = Dynamics::new(&corpus, &PretrainSettings::default(), &mut stream(0, "test", 0));
         for (key, value, said) in [
             ("hidden", json!([0]), "is [0]: networks have 1 to 16 hidden layers of 1 to 4096 units"),
@@ -268,7 +268,7 @@ mod tests {
 
     #[test]
     fn members_take_turns_and_predict_their_mean() {
-        let corpus = Corpus::new(&demos(Task::Stack, 3, 20, 0), "training").expect("demos");
+        let corpus = Corpus::new(demos(Task::Stack, 3, 20, 0), "training").expect("demos");
         let mut dynamics = Dynamics::new(&corpus, &PretrainSettings::default(), &mut stream(0, "test", 0));
         let next = |dynamics: &Dynamics| f64::from(dynamics.predict(corpus.state(4), &[0.1; JOINTS])[BASE_DIM - 8]);
         let (first, alone) = (dynamics.net.clone(), next(&dynamics));
@@ -283,7 +283,7 @@ mod tests {
 
     #[test]
     fn the_target_undoes_the_prediction() {
-        let corpus = Corpus::new(&demos(Task::PickUp, 2, 20, 0), "training").expect("demos");
+        let corpus = Corpus::new(demos(Task::PickUp, 2, 20, 0), "training").expect("demos");
         let dynamics = Dynamics::new(&corpus, &PretrainSettings::default(), &mut stream(0, "test", 0));
         let (mut next, mut output) = ([Lanes::default(); BASE_DIM], [Lanes::default(); BASE_DIM]);
         corpus.model_samples(&dynamics).write_targets(&[7], &mut output);

@@ -28,7 +28,7 @@ struct World {
 }
 
 fn world(task: Task, structure: Structure, settings: TrainSettings) -> World {
-    let corpus = Corpus::new(&demos(task, 8, 20, 5), "training").expect("demos");
+    let corpus = Corpus::new(demos(task, 8, 20, 5), "training").expect("demos");
     let (mut rng, mut rows) = (stream(2, "world", 0), Vec::new());
     corpus.rows_of(&[6, 1, 3, 0, 5, 2, 4, 7], &mut rows);
     let policy = Policy::new(&corpus, &settings, &mut rng);

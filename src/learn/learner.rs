@@ -94,7 +94,7 @@ impl Learner {
             "train.batch, train.bc_batch or train.hidden_units",
         )?;
         let policy = Policy::new(&corpus, settings, &mut stream(seed, "train.init", 0));
-        let model = dynamics.map(|dynamics| Model::new(dynamics));
+        let model = dynamics.map(Model::new);
         Ok(Learner {
             seed,
             updates: 0,

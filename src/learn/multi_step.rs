@@ -173,7 +173,7 @@ mod tests {
             let states = random_states(Task::Stack, 41, i);
             Demo::new(Task::Stack, states, like.actions().to_vec(), like.executed().to_vec()).expect("lengths match")
         };
-        let corpus = Corpus::new(&(0..3).map(jumping).collect::<Vec<_>>(), "training").expect("demos");
+        let corpus = Corpus::new((0..3).map(jumping).collect::<Vec<_>>(), "training").expect("demos");
         let settings = PretrainSettings { structure, features: FeatureSet::Fk, hidden_units: 6, ..Default::default() };
         (Dynamics::new(&corpus, &settings, &mut stream(2, "test", 0)), corpus)
     }
@@ -225,7 +225,7 @@ mod tests {
 
     #[test]
     fn rollouts_end_with_their_demo() {
-        let corpus = Corpus::new(&demos(Task::PickUp, 2, 10, 0), "training").expect("demos");
+        let corpus = Corpus::new(demos(Task::PickUp, 2, 10, 0), "training").expect("demos");
         let steps: Vec<_> = horizons(&corpus, &[0, 8, 9, 10, 20], 5).collect();
         assert_eq!(steps, [(0, 5), (8, 2), (9, 1), (10, 5), (20, 1)]);
     }

@@ -167,7 +167,7 @@ mod tests {
 
     #[test]
     fn a_policy_survives_its_tensors_and_refuses_wrong_ones() {
-        let corpus = Corpus::new(&demos(Task::Stack, 3, 20, 0), "training").expect("demos");
+        let corpus = Corpus::new(demos(Task::Stack, 3, 20, 0), "training").expect("demos");
         let policy = Policy::new(&corpus, &TrainSettings::default(), &mut stream(0, "test", 0));
         assert_eq!(policy.horizon_steps(), 44);
         let (tensors, meta) = (policy.to_tensors(), policy.meta());
@@ -189,7 +189,7 @@ mod tests {
 
     #[test]
     fn a_description_out_of_its_limits_is_refused_before_anything_is_made_of_it() {
-        let corpus = Corpus::new(&demos(Task::Stack, 3, 20, 0), "training").expect("demos");
+        let corpus = Corpus::new(demos(Task::Stack, 3, 20, 0), "training").expect("demos");
         let policy = Policy::new(&corpus, &TrainSettings::default(), &mut stream(0, "test", 0));
         for (key, value, said) in [
             ("hidden", json!([0]), "is [0]: networks have 1 to 16 hidden layers of 1 to 4096 units"),
@@ -221,7 +221,7 @@ mod tests {
 
     #[test]
     fn samples_scatter_around_the_mean() {
-        let corpus = Corpus::new(&demos(Task::PickUp, 2, 20, 0), "training").expect("demos");
+        let corpus = Corpus::new(demos(Task::PickUp, 2, 20, 0), "training").expect("demos");
         let policy = Policy::new(&corpus, &TrainSettings::default(), &mut stream(0, "test", 0));
         let (row, mut rng) = (corpus.state(3), stream(1, "test", 0));
         let mean = policy.act(row);

@@ -1,6 +1,6 @@
 //! Supervised learning of a network by minibatches, in shards: how the dynamics network learns from observed transitions (Eq. 6).
 
-use super::corpus::Samples;
+use super::samples::Samples;
 use super::shards;
 use crate::nn::{BLOCK_PANELS, LANES, Lanes, Mlp, Pass, panels_of};
 use rayon::prelude::*;
