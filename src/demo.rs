@@ -173,6 +173,16 @@ impl Demo {
         &self.executed
     }
 
+    /// Commanded action t (0-based) \[rad/s\].
+    pub fn action(&self, t: usize) -> &[f32] {
+        &self.actions[t * JOINTS..(t + 1) * JOINTS]
+    }
+
+    /// Executed action t (0-based) \[rad/s\].
+    pub fn executed_action(&self, t: usize) -> &[f32] {
+        &self.executed[t * JOINTS..(t + 1) * JOINTS]
+    }
+
     /// State t (0-based).
     pub fn state(&self, t: usize) -> &[f32] {
         let d = self.task.state_dim();

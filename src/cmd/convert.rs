@@ -166,3 +166,28 @@ fn say_of_runs(found: &[Found], console: &Console) {
         ));
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_recording_that_is_replaced_between_its_two_readings_is_named() {
+        let fixture = Path::new(env!("CARGO_MANIFEST_DIR")).join("fixtures/pick-up/recordings/episode-00000.mcap");
+        let dir = tempfile::tempdir().expect("temporary directory");
+        let path = dir.path().join("episode-00007.mcap");
+        std::fs::copy(fixture, &path).expect("copied");
+        let found = |bytes: usize| find(&path, Task::PickUp, true, &Room(AtomicUsize::new(bytes))).expect("a recording").1;
+        let (held, again) = (found(HELD_BYTES).expect("kept"), found(0).expect("kept"));
+        assert!(held.held.is_some() && again.held.is_none());
+        let [one, other] = [&held, &again].map(|found| found.episode(None).expect("an episode"));
+        assert_eq!((&one.demo, &one.rewards, one.source_index), (&other.demo, &other.rewards, 7));
+
+        let (mut episode, made) = recording::read(&path).expect("a recording");
+        episode.steps[0].commanded[0] += 0.1;
+        recording::write(&path, &episode, "<robot/>", &made).expect("written");
+        let said = again.episode(None).expect_err("refused").to_string();
+        assert!(said.contains("episode-00007.mcap: changed while"), "{said}");
+        assert!(held.episode(None).is_ok(), "what is held is not read again");
+    }
+}

@@ -45,7 +45,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome> {
     train.extend(again);
     let mut epochs = Epochs::new(&context.console);
     let mut log = |epoch: &EpochMetrics| epochs.step(epoch);
-    let (dynamics, report) = pretrain_dynamics(&train, &validation, &pipeline.pretrain, seed, &mut log, &context.interrupt)?;
+    let (dynamics, report) = pretrain_dynamics(train, validation, &pipeline.pretrain, seed, &mut log, &context.interrupt)?;
     epochs.finish();
     context.console.say(output::table_text(&report.errors).trim_end());
     let error_table = table_file::encode(&errors, &report.errors, &provenance)?;

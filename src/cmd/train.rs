@@ -91,7 +91,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome> {
         resume,
         interrupt: &context.interrupt,
     };
-    let trained = train(args.method, &demos, &validation, dynamics, &pipeline.train, seed, hooks);
+    let trained = train(args.method, demos, validation, dynamics, &pipeline.train, seed, hooks);
     let trained = trained.map_err(|why| keeper.explain(why))?;
     epochs.finish();
     let mut meta = trained.policy.meta();

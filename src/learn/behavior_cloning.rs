@@ -1,11 +1,12 @@
 //! Algorithm 2: behavior cloning. L_BC (Eq. 3) and the degree of policy convergence d_conv (Eq. 4) over the states of the demos.
 
-use super::corpus::{Samples, row};
+use super::corpus::row;
 use super::policy::Policy;
+use super::samples::{PolicySamples, Samples};
 use super::shards;
 use crate::config::{ActionChoice, Convergence, Objective, TrainSettings};
 use crate::math::exp_f32;
-use crate::nn::{LANES, Lanes, Panels, Pass, gaussian, panels_of};
+use crate::nn::{BLOCK_PANELS, LANES, Lanes, Panels, Pass, gaussian, panels_of};
 use crate::seed::normal;
 use crate::state::JOINTS;
 use rand::Rng;
@@ -24,7 +25,7 @@ pub struct Cloned {
 #[derive(Clone, Copy)]
 pub struct Batch<'a> {
     /// The corpus' policy samples.
-    pub samples: &'a Samples,
+    pub samples: &'a PolicySamples<'a>,
     /// Transitions of the corpus.
     pub rows: &'a [usize],
     /// Number of demos that they amount to.
@@ -63,6 +64,8 @@ pub struct Workspace {
 struct Shard {
     pass: Pass,
     rows: usize,
+    /// Mean actions, rows x 9.
+    mean: Vec<f32>,
     /// Gradient of L_BC with respect to the mean actions, standardised.
     d_bc: Panels,
     noise: Panels,
@@ -75,6 +78,22 @@ struct Shard {
 /// Algorithm 2 over a batch. `rng` draws the samples a_t ~ pi_theta(s_t^E) where the settings ask for them; p_t always comes from the
 /// mean unless it is the sampled density. The gradient with respect to the mean actions stays in `work` for [`policy_gradient`].
 pub fn behavior_cloning(policy: &Policy, batch: Batch, choices: &Choices, rng: &mut impl Rng, work: &mut Workspace) -> Cloned {
+    in_blocks(policy, batch, choices, rng, work, usize::MAX)
+}
+
+/// As [`behavior_cloning`], of any number of rows in the memory of a few: nothing stays for [`policy_gradient`].
+pub fn validate(policy: &Policy, batch: Batch, choices: &Choices, rng: &mut impl Rng, work: &mut Workspace) -> Cloned {
+    in_blocks(policy, batch, choices, rng, work, BLOCK_PANELS * LANES)
+}
+
+fn in_blocks(
+    policy: &Policy,
+    batch: Batch,
+    choices: &Choices,
+    rng: &mut impl Rng,
+    work: &mut Workspace,
+    block_rows: usize,
+) -> Cloned {
     let rows = batch.rows.len();
     let samples = choices.action == ActionChoice::Sample || choices.convergence == Convergence::SampledDensity;
     draw_noise(samples, rows, rng, &mut work.noise);
@@ -83,13 +102,14 @@ pub fn behavior_cloning(policy: &Policy, batch: Batch, choices: &Choices, rng: &
     let noise = &work.noise;
     work.shards[..work.active].par_iter_mut().enumerate().for_each(|(i, shard)| {
         let part = shards::range(rows, shards::count(rows), i);
-        let panels = panels_of(part.len());
-        shard.pass.reserve(&policy.net, panels);
-        let inputs = |slot: usize| row(&batch.samples.inputs, policy.net.inputs(), batch.rows[part.start + slot]);
-        shard.pass.input.write_rows(0, part.len(), inputs);
-        policy.net.forward(&mut shard.pass, 0..panels);
-        let eps = if samples { &noise[part.start * JOINTS..part.end * JOINTS] } else { &[] };
-        shard.losses(policy, batch, &batch.rows[part], eps, choices);
+        shard.begin(policy, part.len(), block_rows);
+        for from in part.clone().step_by(block_rows) {
+            let block = from..part.end.min(from.saturating_add(block_rows));
+            batch.samples.write_inputs(&batch.rows[block.clone()], &mut shard.pass.input);
+            policy.net.forward(&mut shard.pass, 0..panels_of(block.len()));
+            let eps = if samples { &noise[block.start * JOINTS..block.end * JOINTS] } else { &[] };
+            shard.losses(policy, batch, &batch.rows[block], eps, choices);
+        }
     });
     work.collect(policy, rows, choices.action)
 }
@@ -107,7 +127,7 @@ impl Workspace {
     pub fn new(policy: &Policy, most_rows: usize) -> Self {
         let rows = shards::most_rows(most_rows);
         let shard = || {
-            let mut shard = Shard::default();
+            let mut shard = Shard { mean: Vec::with_capacity(rows * JOINTS), ..Shard::default() };
             shard.pass.provide(&policy.net, panels_of(rows));
             [&mut shard.d_bc, &mut shard.noise].into_iter().for_each(|array| array.provide(JOINTS, panels_of(rows)));
             shard
@@ -122,6 +142,15 @@ impl Workspace {
 }
 
 impl Shard {
+    /// Nothing is known of the `rows` that come, at most `block_rows` at once.
+    fn begin(&mut self, policy: &Policy, rows: usize, block_rows: usize) {
+        self.pass.reserve(&policy.net, panels_of(rows.min(block_rows)));
+        (self.rows, self.loss, self.agreement) = (rows, 0.0, 0.0);
+        (self.residual2, self.d_log_std) = ([0.0; JOINTS], [0.0; JOINTS]);
+        self.mean.clear();
+    }
+
+    /// Adds the losses of `rows`, whose actions the last pass has.
     fn losses(&mut self, policy: &Policy, batch: Batch, rows: &[usize], noise: &[f32], choices: &Choices) {
         let unit = &policy.action_scaling().std;
         let sigma: [f32; JOINTS] = std::array::from_fn(|i| exp_f32(policy.log_std[i]));
@@ -132,10 +161,14 @@ impl Shard {
         };
         let sampled = choices.action == ActionChoice::Sample;
         let panels = panels_of(rows.len());
-        (self.rows, self.loss, self.agreement) = (rows.len(), 0.0, 0.0);
-        (self.residual2, self.d_log_std) = ([0.0; JOINTS], [0.0; JOINTS]);
+        let known = self.mean.len();
+        self.mean.resize(known + rows.len() * JOINTS, 0.0);
+        self.pass.output.read_rows(&mut self.mean[known..]);
         self.d_bc.reserve(JOINTS, panels);
-        self.d_bc.write_rows(0, rows.len(), |slot| row(&batch.samples.targets, JOINTS, rows[slot]));
+        for (p, rows) in rows.chunks(LANES).enumerate() {
+            batch.samples.write_targets(rows, self.d_bc.panel_mut(p));
+        }
+        self.d_bc.clear_tail(rows.len());
         if !noise.is_empty() {
             self.noise.reserve(JOINTS, panels);
             self.noise.write_rows(0, rows.len(), |slot| row(noise, JOINTS, slot));
@@ -183,9 +216,7 @@ impl Workspace {
             cloned.d_conv += shard.agreement / rows as f64;
             shards::add_scaled(&mut residual2, &shard.residual2, 1.0 / rows as f32);
             shards::add_scaled(&mut self.d_log_std, &shard.d_log_std, 1.0);
-            let from = self.mean.len();
-            self.mean.resize(from + shard.rows * JOINTS, 0.0);
-            shard.pass.output.read_rows(&mut self.mean[from..]);
+            self.mean.extend_from_slice(&shard.mean);
         }
         if action == ActionChoice::Mean {
             gaussian::add_nll_gradient(&policy.log_std, &residual2, &mut self.d_log_std);

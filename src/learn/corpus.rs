@@ -1,43 +1,45 @@
 //! All demos side by side: transition r of the corpus is (s_t, a_t, s_{t+1}) of one demo, transitions of a demo are consecutive.
 
 use super::dynamics::Dynamics;
+use super::features::{Features, Relations, derived_width, relations};
+use super::hand::Chain;
 use super::policy::Policy;
+use super::samples::{ModelSamples, PolicySamples};
+use crate::config::FeatureSet;
 use crate::demo::{Demo, LARGEST_NUMBER};
 use crate::error::{Error, Result};
+use crate::nn::{LANES, Lanes, Panels, kernel, panels_of};
 use crate::state::{BASE_DIM, JOINTS};
 use crate::tasks::Task;
+use std::array::from_fn;
+use std::borrow::Cow;
+use std::iter::repeat_n;
 use std::ops::Range;
+use std::sync::OnceLock;
 
-/// Transitions of many demos, row-major.
+/// Entries of the widest state.
+const MOST_STATE: usize = BASE_DIM + 7;
+
+/// Transitions of many demos, which are held once: what is derived from them is worked out for each batch.
 pub struct Corpus {
     /// The task.
     pub task: Task,
     /// First transition of each demo, and the end of the last.
     pub starts: Vec<usize>,
-    /// s_t, `task.state_dim()` wide.
-    pub states: Vec<f32>,
-    /// The entries of s_{t+1} that change during an episode, [`BASE_DIM`] wide.
-    pub next: Vec<f32>,
-    /// Commanded actions \[rad/s\].
-    pub commanded: Vec<f32>,
-    /// Executed actions \[rad/s\].
-    pub executed: Vec<f32>,
-}
-
-/// Inputs and targets of a network, computed once.
-pub struct Samples {
-    /// Rows of the network's input width.
-    pub inputs: Vec<f32>,
-    /// Rows of its output width.
-    pub targets: Vec<f32>,
+    demos: Vec<Demo>,
+    /// The demo of each transition.
+    owners: Vec<u32>,
+    /// What kinematics derive from each s_t, once it has been asked for: row-major, as wide as the task has it.
+    related: OnceLock<Vec<f32>>,
 }
 
 impl Corpus {
-    /// Collects `demos`; `what` names them in errors ("training", "validation").
+    /// Takes `demos`; `what` names them in errors ("training", "validation").
     ///
     /// # Errors
     /// [`Error::Failed`] when there is no demo, tasks are mixed, or a number is beyond all measure: losses would be none.
-    pub fn new(demos: &[Demo], what: &str) -> Result<Self> {
+    pub fn new<'a>(demos: impl Into<Cow<'a, [Demo]>>, what: &str) -> Result<Self> {
+        let demos = demos.into().into_owned();
         let Some(first) = demos.first() else {
             return Err(Error::Failed(format!("there is no {what} demo: record more episodes, or look at why all failed")));
         };
@@ -45,28 +47,23 @@ impl Corpus {
         if let Some(other) = demos.iter().find(|d| d.task() != task) {
             return Err(Error::Failed(format!("{what} demos of {task} and {} are mixed; give one task's", other.task())));
         }
-        let mut corpus = Corpus { task, starts: vec![0], states: vec![], next: vec![], commanded: vec![], executed: vec![] };
+        let mut starts = vec![0];
         for (number, demo) in demos.iter().enumerate() {
             plausible(demo).map_err(|why| Error::Failed(format!("{what} demo {number}: {why}")))?;
-            for t in 0..demo.len() {
-                corpus.states.extend_from_slice(demo.state(t));
-                corpus.next.extend_from_slice(&demo.state(t + 1)[..BASE_DIM]);
-            }
-            corpus.commanded.extend_from_slice(demo.actions());
-            corpus.executed.extend_from_slice(demo.executed());
-            corpus.starts.push(corpus.commanded.len() / JOINTS);
+            starts.push(starts[number] + demo.len());
         }
-        Ok(corpus)
+        let owners = demos.iter().zip(0..).flat_map(|(demo, i)| repeat_n(i, demo.len())).collect();
+        Ok(Corpus { task, starts, demos, owners, related: OnceLock::new() })
     }
 
     /// Number of transitions.
     pub fn rows(&self) -> usize {
-        self.commanded.len() / JOINTS
+        self.owners.len()
     }
 
     /// Number of demos.
     pub fn demos(&self) -> usize {
-        self.starts.len() - 1
+        self.demos.len()
     }
 
     /// Transitions of a demo.
@@ -86,36 +83,85 @@ impl Corpus {
         rows.extend(demos.iter().flat_map(|i| self.demo(*i)));
     }
 
+    /// The demo of transition `r`, and its place there.
+    #[inline]
+    fn place(&self, r: usize) -> (&Demo, usize) {
+        let owner = self.owners[r] as usize;
+        (&self.demos[owner], r - self.starts[owner])
+    }
+
     /// s_t of transition `r`.
+    #[inline]
     pub fn state(&self, r: usize) -> &[f32] {
-        row(&self.states, self.task.state_dim(), r)
+        let (demo, t) = self.place(r);
+        demo.state(t)
+    }
+
+    /// The entries of s_{t+1} that change during an episode, [`BASE_DIM`] of them.
+    #[inline]
+    pub fn next(&self, r: usize) -> &[f32] {
+        let (demo, t) = self.place(r);
+        &demo.state(t + 1)[..BASE_DIM]
+    }
+
+    /// The commanded action of transition `r` \[rad/s\].
+    #[inline]
+    pub fn commanded(&self, r: usize) -> &[f32] {
+        let (demo, t) = self.place(r);
+        demo.action(t)
+    }
+
+    /// The executed action of transition `r` \[rad/s\].
+    #[inline]
+    pub fn executed(&self, r: usize) -> &[f32] {
+        let (demo, t) = self.place(r);
+        demo.executed_action(t)
+    }
+
+    /// What kinematics derive from s_t of transition `r`.
+    #[inline]
+    pub fn relations(&self, r: usize) -> &[f32] {
+        row(self.related.get_or_init(|| self.relate()), derived_width(self.task, FeatureSet::Fk), r)
+    }
+
+    fn relate(&self) -> Vec<f32> {
+        let (chain, width) = (Chain::default(), derived_width(self.task, FeatureSet::Fk));
+        let (mut all, mut state) = (vec![0.0; self.rows() * width], vec![Lanes::default(); self.task.state_dim()]);
+        let mut panel = Panels::default();
+        panel.reserve(width, 1);
+        for (block, to) in all.chunks_mut(LANES * width).enumerate() {
+            kernel::interleave(&mut state, from_fn(|lane| self.state((block * LANES + lane).min(self.rows() - 1))));
+            panel.panel_mut(0).copy_from_slice(&relations(self.task, &state, &chain.hand(&state))[..width]);
+            panel.read_rows(to);
+        }
+        all
+    }
+
+    /// Writes what `features` see in `count` transitions, the `i`-th of which is `at(i)`, from the first panel on; zero in lanes without one.
+    pub fn write_features(&self, features: &Features, count: usize, at: impl Fn(usize) -> usize, to: &mut Panels) {
+        let mut state = [Lanes::default(); MOST_STATE];
+        let (state, seen, width) =
+            (&mut state[..self.task.state_dim()], features.width(), derived_width(self.task, FeatureSet::Fk));
+        let mut related = Relations::default();
+        for p in 0..panels_of(count) {
+            let rows: [usize; LANES] = from_fn(|lane| at((p * LANES + lane).min(count - 1)));
+            kernel::interleave(state, rows.map(|r| self.state(r)));
+            if features.needs_hand() {
+                kernel::interleave(&mut related[..width], rows.map(|r| self.relations(r)));
+            }
+            features.write(state, &related, &mut to.panel_mut(p)[..seen]);
+        }
+        to.clear_tail(count);
     }
 
     /// What behavior cloning learns: the policy's inputs and the standardised commanded actions.
-    pub fn policy_samples(&self, policy: &Policy) -> Samples {
-        let (features, width) = (policy.features(), policy.features().width());
-        let mut inputs = Vec::with_capacity(self.rows() * width);
-        features.for_each(&self.states, |row| inputs.extend_from_slice(row));
-        let scaling = policy.action_scaling();
-        let targets = self.commanded.iter().enumerate().map(|(i, a)| scaling.apply(i % JOINTS, *a)).collect();
-        Samples { inputs, targets }
+    pub fn policy_samples<'a>(&'a self, policy: &'a Policy) -> PolicySamples<'a> {
+        PolicySamples { corpus: self, policy }
     }
 
     /// What the dynamics network learns from the observed transitions: its inputs, and what it must add, standardised.
-    pub fn model_samples(&self, dynamics: &Dynamics) -> Samples {
-        let width = dynamics.inputs();
-        let (mut inputs, mut targets) = (Vec::with_capacity(self.rows() * width), vec![0.0; self.rows() * BASE_DIM]);
-        dynamics.features().for_each(&self.states, |seen| {
-            let action = row(&self.executed, JOINTS, inputs.len() / width);
-            inputs.extend_from_slice(seen);
-            inputs.extend(action.iter().enumerate().map(|(i, a)| dynamics.action_scaling().apply(i, *a)));
-        });
-        for r in 0..self.rows() {
-            let (state, action) = (self.state(r), row(&self.executed, JOINTS, r));
-            let target = &mut targets[r * BASE_DIM..(r + 1) * BASE_DIM];
-            dynamics.residual_target(state, action, row(&self.next, BASE_DIM, r), target);
-        }
-        Samples { inputs, targets }
+    pub fn model_samples<'a>(&'a self, dynamics: &'a Dynamics) -> ModelSamples<'a> {
+        ModelSamples { corpus: self, dynamics }
     }
 }
 
@@ -161,7 +207,7 @@ mod tests {
         let corpus = Corpus::new(&demos, "training").expect("demos");
         assert_eq!((corpus.rows(), corpus.demo(1)), (8, 5..8));
         assert_eq!(corpus.state(6), demos[1].state(1));
-        assert_eq!(row(&corpus.next, BASE_DIM, 7), &demos[1].state(3)[..BASE_DIM]);
+        assert_eq!(corpus.next(7), &demos[1].state(3)[..BASE_DIM]);
     }
 
     #[test]

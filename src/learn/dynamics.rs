@@ -38,20 +38,23 @@ pub struct Dynamics {
 impl Dynamics {
     /// A network with random weights; scalings from the training demos.
     pub(super) fn new(corpus: &Corpus, settings: &PretrainSettings, rng: &mut impl Rng) -> Self {
-        let features = Features::fit(corpus.task, settings.features, false, &corpus.states);
+        let features = Features::fit(corpus, settings.features, false);
         let mut widths = vec![settings.hidden_units; settings.hidden_layers + 2];
         (widths[0], widths[settings.hidden_layers + 1]) = (features.width() + JOINTS, BASE_DIM);
         let mut dynamics = Dynamics {
             task: corpus.task,
             structure: settings.structure,
             features,
-            action: Scaling::fit(&corpus.executed, JOINTS, ACTION_FLOOR_RAD_S),
+            action: Scaling::fit(corpus.rows(), JOINTS, ACTION_FLOOR_RAD_S, |r, row| row.copy_from_slice(corpus.executed(r))),
             residual: Scaling { mean: vec![0.0; BASE_DIM], std: vec![1.0; BASE_DIM] },
             net: Mlp::new(&widths, settings.activation, rng),
             others: Vec::new(),
             settings: settings.clone(),
         };
-        dynamics.residual = Scaling::fit(&corpus.model_samples(&dynamics).targets, BASE_DIM, STEP_FLOOR);
+        dynamics.residual = Scaling::fit(corpus.rows(), BASE_DIM, STEP_FLOOR, |r, row| {
+            let (state, action, next) = (corpus.state(r), corpus.executed(r), corpus.next(r));
+            row.iter_mut().enumerate().for_each(|(i, v)| *v = next[i] - dynamics.known_next(i, state[i], action[i % JOINTS]));
+        });
         dynamics
     }
 
@@ -95,11 +98,6 @@ impl Dynamics {
         self.structure
     }
 
-    /// Number of network inputs.
-    pub(super) fn inputs(&self) -> usize {
-        self.features.width() + JOINTS
-    }
-
     /// The network's inputs for a panel of states and actions \[rad/s\].
     pub(super) fn write_inputs(&self, state: &[Lanes], action: &[Lanes], out: &mut [Lanes]) {
         let (seen, given) = out.split_at_mut(self.features.width());
@@ -138,10 +136,12 @@ impl Dynamics {
         }
     }
 
-    /// What the network must put out for the observed `next`.
-    pub(super) fn residual_target(&self, state: &[f32], action: &[f32], next: &[f32], target: &mut [f32]) {
-        for (i, slot) in target.iter_mut().enumerate() {
-            *slot = self.residual.apply(i, next[i] - self.known_next(i, state[i], action[i % JOINTS]));
+    /// What the network must put out for the observed next states, in their place.
+    pub(super) fn write_residuals(&self, state: &[Lanes], action: &[Lanes], next: &mut [Lanes]) {
+        for (i, slot) in next.iter_mut().enumerate() {
+            let (state, action, next) = (state[i].0, action[i % JOINTS].0, slot.0);
+            let residual = |l: usize| self.residual.apply(i, next[l] - self.known_next(i, state[l], action[l]));
+            *slot = Lanes(std::array::from_fn(residual));
         }
     }
 
@@ -232,12 +232,13 @@ fn member(i: usize) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::learn::samples::Samples;
     use crate::learn::testing::demos;
     use crate::seed::stream;
 
     #[test]
     fn dynamics_survive_their_tensors_and_copy_the_context() {
-        let corpus = Corpus::new(&demos(Task::Stack, 3, 20, 0), "training").expect("demos");
+        let corpus = Corpus::new(demos(Task::Stack, 3, 20, 0), "training").expect("demos");
         for structure in [Structure::Plain, Structure::Kinematic] {
             let settings = PretrainSettings { structure, ensemble: 3, ..Default::default() };
             let mut dynamics = Dynamics::new(&corpus, &settings, &mut stream(0, "test", 0));
@@ -251,7 +252,7 @@ mod tests {
 
     #[test]
     fn a_description_out_of_its_limits_is_refused() {
-        let corpus = Corpus::new(&demos(Task::Stack, 3, 20, 0), "training").expect("demos");
+        let corpus = Corpus::new(demos(Task::Stack, 3, 20, 0), "training").expect("demos");
         let dynamics = Dynamics::new(&corpus, &PretrainSettings::default(), &mut stream(0, "test", 0));
         for (key, value, said) in [
             ("hidden", json!([0]), "is [0]: networks have 1 to 16 hidden layers of 1 to 4096 units"),
@@ -267,7 +268,7 @@ mod tests {
 
     #[test]
     fn members_take_turns_and_predict_their_mean() {
-        let corpus = Corpus::new(&demos(Task::Stack, 3, 20, 0), "training").expect("demos");
+        let corpus = Corpus::new(demos(Task::Stack, 3, 20, 0), "training").expect("demos");
         let mut dynamics = Dynamics::new(&corpus, &PretrainSettings::default(), &mut stream(0, "test", 0));
         let next = |dynamics: &Dynamics| f64::from(dynamics.predict(corpus.state(4), &[0.1; JOINTS])[BASE_DIM - 8]);
         let (first, alone) = (dynamics.net.clone(), next(&dynamics));
@@ -282,14 +283,13 @@ mod tests {
 
     #[test]
     fn the_target_undoes_the_prediction() {
-        let corpus = Corpus::new(&demos(Task::PickUp, 2, 20, 0), "training").expect("demos");
+        let corpus = Corpus::new(demos(Task::PickUp, 2, 20, 0), "training").expect("demos");
         let dynamics = Dynamics::new(&corpus, &PretrainSettings::default(), &mut stream(0, "test", 0));
-        let samples = corpus.model_samples(&dynamics);
-        let mut next = [Lanes::default(); BASE_DIM];
+        let (mut next, mut output) = ([Lanes::default(); BASE_DIM], [Lanes::default(); BASE_DIM]);
+        corpus.model_samples(&dynamics).write_targets(&[7], &mut output);
         let splat = |row: &[f32]| -> Vec<Lanes> { row.iter().map(|v| Lanes::splat(*v)).collect() };
-        let (action, output) = (splat(&corpus.executed[63..72]), splat(&samples.targets[7 * BASE_DIM..8 * BASE_DIM]));
-        dynamics.write_next(&splat(corpus.state(7)), &action, &output, &mut next);
-        for (a, b) in next.iter().zip(&corpus.next[7 * BASE_DIM..]) {
+        dynamics.write_next(&splat(corpus.state(7)), &splat(corpus.executed(7)), &output, &mut next);
+        for (a, b) in next.iter().zip(corpus.next(7)) {
             assert!((a.0[0] - b).abs() < 1e-6, "{a:?} against {b}");
         }
     }

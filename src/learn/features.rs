@@ -1,9 +1,10 @@
 //! What a network sees of a state, and how a gradient comes back through it.
 
+use super::corpus::Corpus;
 use super::hand::{Chain, Hand, Vec3, add, cross, sub, turn, turn_back};
 use super::scaling::Scaling;
 use crate::config::FeatureSet;
-use crate::nn::{LANES, Lanes, Panels, kernel};
+use crate::nn::{Lanes, kernel};
 use crate::state::{BASE_DIM, JOINTS};
 use crate::tasks::{REST_HEIGHT_M, Task};
 
@@ -28,25 +29,20 @@ pub struct Features {
     chain: Chain,
 }
 
-/// Hand, block in the hand's frame, and goal minus block: what the derived features are made of.
-struct Relations {
-    block_in_hand: Vec3,
-    goal_minus_block: Option<Vec3>,
-}
+/// What kinematics derive from a state: tool point, two columns of the hand's rotation, block in the hand's frame, goal minus block.
+pub type Relations = [Lanes; MOST_RELATIONS];
+/// Entries of [`Relations`] where a task has a goal or a base block; others leave the last three alone.
+pub const MOST_RELATIONS: usize = HAND_WIDTH + 3;
 
 impl Features {
-    /// Fits the scaling to `states` (row-major, `task.state_dim()` wide).
-    pub fn fit(task: Task, set: FeatureSet, mask_dq: bool, states: &[f32]) -> Self {
-        let state = Scaling::fit(states, task.state_dim(), STATE_FLOOR);
-        let width = derived_width(task, set);
-        let plain = Scaling { mean: vec![0.0; width], std: vec![1.0; width] };
-        let mut features = Self::from_scaling(task, set, mask_dq, state, plain);
-        if width > 0 {
-            let mut rows = Vec::with_capacity(states.len() / task.state_dim() * width);
-            features.for_each(states, |inputs| rows.extend_from_slice(&inputs[features.kept.len()..][..width]));
-            features.derived = Scaling::fit(&rows, width, STATE_FLOOR);
-        }
-        features
+    /// Fits the scaling to the transitions of `corpus`.
+    pub fn fit(corpus: &Corpus, set: FeatureSet, mask_dq: bool) -> Self {
+        let (task, width) = (corpus.task, derived_width(corpus.task, set));
+        let state = |r: usize, row: &mut [f32]| row.copy_from_slice(corpus.state(r));
+        let derived = |r: usize, row: &mut [f32]| row.copy_from_slice(corpus.relations(r));
+        let state = Scaling::fit(corpus.rows(), task.state_dim(), STATE_FLOOR, state);
+        let derived = if width == 0 { Scaling::default() } else { Scaling::fit(corpus.rows(), width, STATE_FLOOR, derived) };
+        Self::from_scaling(task, set, mask_dq, state, derived)
     }
 
     /// From known scalings, e.g. those of a file; their widths must be the task's and `derived_width`'s.
@@ -84,58 +80,28 @@ impl Features {
         self.set != FeatureSet::Raw
     }
 
-    /// The inputs of each of `states` (row-major), one after another.
-    pub fn for_each(&self, states: &[f32], mut take: impl FnMut(&[f32])) {
-        let (mut state, mut inputs, mut row) = (Panels::default(), Panels::default(), vec![0.0; self.width()]);
-        state.reserve(self.task.state_dim(), 1);
-        inputs.reserve(self.width(), 1);
-        for block in states.chunks(LANES * self.task.state_dim()) {
-            let rows = block.chunks_exact(self.task.state_dim());
-            rows.clone().enumerate().for_each(|(r, values)| state.write_row(r, values));
-            self.forward(state.panel(0), &self.hand(state.panel(0)), inputs.panel_mut(0));
-            for r in 0..rows.len() {
-                inputs.read_row(r, &mut row);
-                take(&row);
-            }
-        }
-    }
-
     /// Where the hand is in these states; all zeros when these features do not need it.
     pub fn hand(&self, state: &[Lanes]) -> Hand {
         if self.needs_hand() { self.chain.hand(state) } else { Hand::default() }
     }
 
-    fn relations(&self, state: &[Lanes], hand: &Hand) -> Relations {
-        let block = vec3(state, BLOCK);
-        let goal = match self.task {
-            Task::PickUp => None,
-            Task::PickAndPlace => Some(vec3(state, BASE_DIM)),
-            Task::Stack => Some(add(vec3(state, BASE_DIM), [0.0, 0.0, 2.0 * REST_HEIGHT_M as f32].map(Lanes::splat))),
-        };
-        Relations {
-            block_in_hand: turn_back(&hand.columns, sub(block, hand.tool)),
-            goal_minus_block: goal.map(|goal| sub(goal, block)),
-        }
-    }
-
     /// Writes the inputs of a panel of states into `out` (`width()` entries).
     pub fn forward(&self, state: &[Lanes], hand: &Hand, out: &mut [Lanes]) {
+        let related = if self.needs_hand() { relations(self.task, state, hand) } else { Relations::default() };
+        self.write(state, &related, out);
+    }
+
+    /// As [`Features::forward`], where the relations are known already.
+    pub fn write(&self, state: &[Lanes], related: &Relations, out: &mut [Lanes]) {
         let (kept, rest) = out.split_at_mut(self.kept.len());
         for (slot, i) in kept.iter_mut().zip(&self.kept) {
             *slot = state[*i].map(|v| self.state.apply(*i, v));
         }
-        if !self.needs_hand() {
-            return;
-        }
         let (derived, near) = rest.split_at_mut(self.derived.width());
-        let relations = self.relations(state, hand);
-        let parts = [hand.tool, hand.columns[0], hand.columns[1], relations.block_in_hand];
-        let values = parts.iter().chain(&relations.goal_minus_block).flatten();
-        for (i, (slot, value)) in derived.iter_mut().zip(values).enumerate() {
+        for (i, (slot, value)) in derived.iter_mut().zip(related).enumerate() {
             *slot = value.map(|v| self.derived.apply(i, v));
         }
-        let close = [relations.block_in_hand].into_iter().chain(relations.goal_minus_block).flatten();
-        near.iter_mut().zip(close).for_each(|(slot, value)| *slot = value / NEAR_M);
+        near.iter_mut().zip(&related[HAND_WIDTH - 3..]).for_each(|(slot, value)| *slot = *value / NEAR_M);
         kernel::tanh(near);
     }
 
@@ -173,6 +139,22 @@ impl Features {
     }
 }
 
+/// The relations in a panel of states.
+pub fn relations(task: Task, state: &[Lanes], hand: &Hand) -> Relations {
+    let block = vec3(state, BLOCK);
+    let goal = match task {
+        Task::PickUp => None,
+        Task::PickAndPlace => Some(vec3(state, BASE_DIM)),
+        Task::Stack => Some(add(vec3(state, BASE_DIM), [0.0, 0.0, 2.0 * REST_HEIGHT_M as f32].map(Lanes::splat))),
+    };
+    let in_hand = turn_back(&hand.columns, sub(block, hand.tool));
+    let goal_minus_block = goal.map(|goal| sub(goal, block)).unwrap_or_default();
+    let mut related = Relations::default();
+    let parts = [hand.tool, hand.columns[0], hand.columns[1], in_hand, goal_minus_block];
+    related.iter_mut().zip(parts.iter().flatten()).for_each(|(slot, value)| *slot = *value);
+    related
+}
+
 /// Number of derived entries of a feature set.
 pub fn derived_width(task: Task, set: FeatureSet) -> usize {
     match set {
@@ -188,6 +170,7 @@ fn vec3(row: &[Lanes], at: usize) -> Vec3 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::demo::Demo;
     use crate::learn::testing::{demo, random_states};
 
     #[test]
@@ -199,7 +182,9 @@ mod tests {
             (Task::Stack, FeatureSet::Raw, false),
         ] {
             let states = random_states(task, 20, 7);
-            let features = Features::fit(task, set, mask_dq, &states);
+            let still = vec![0.0; 19 * JOINTS];
+            let demo = Demo::new(task, states.clone(), still.clone(), still).expect("lengths match");
+            let features = Features::fit(&Corpus::new(&[demo], "training").expect("a demo"), set, mask_dq);
             let state: Vec<Lanes> = states[..task.state_dim()].iter().map(|v| Lanes::splat(*v)).collect();
             let weights: Vec<Lanes> = (0..features.width()).map(|i| Lanes::splat(((i * 29 % 13) as f32 - 6.0) / 6.0)).collect();
             let loss = |state: &[Lanes]| -> f64 {
@@ -228,7 +213,8 @@ mod tests {
     #[test]
     fn masking_leaves_out_the_nine_velocities() {
         let demo = demo(Task::Stack, 30, 1);
-        let width = |mask| Features::fit(Task::Stack, FeatureSet::FkNear, mask, demo.states()).width();
+        let corpus = Corpus::new(&[demo], "training").expect("a demo");
+        let width = |mask| Features::fit(&corpus, FeatureSet::FkNear, mask).width();
         assert_eq!(width(false), 32 + 15 + 6);
         assert_eq!(width(true), width(false) - JOINTS);
     }

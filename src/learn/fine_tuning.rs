@@ -1,6 +1,6 @@
 //! The dynamics network during Algorithm 1: rollouts pass through it, and it keeps learning from observed transitions (Eq. 6).
 
-use super::corpus::{Corpus, Samples};
+use super::corpus::Corpus;
 use super::dynamics::Dynamics;
 use super::pretrain_dynamics::{loss_weights, model_loss, validation_loss};
 use super::regression::Regression;
@@ -10,9 +10,6 @@ use crate::nn::{Adam, clip_by_global_norm};
 pub struct Model {
     /// f_phi.
     pub dynamics: Dynamics,
-    /// Its inputs and targets on the training demos.
-    pub samples: Samples,
-    held_out: Samples,
     weights: Vec<f32>,
     /// One a network of the ensemble, that of the network in use first.
     pub(super) adams: Vec<Adam>,
@@ -20,11 +17,9 @@ pub struct Model {
 }
 
 impl Model {
-    /// A pretrained network on these demos.
-    pub fn new(dynamics: Dynamics, corpus: &Corpus, held_out: &Corpus) -> Self {
+    /// A pretrained network.
+    pub fn new(dynamics: Dynamics) -> Self {
         Model {
-            samples: corpus.model_samples(&dynamics),
-            held_out: held_out.model_samples(&dynamics),
             weights: loss_weights(&dynamics),
             adams: (0..=dynamics.others.len()).map(|_| Adam::new(dynamics.net.params().len())).collect(),
             work: Regression::default(),
@@ -39,10 +34,10 @@ impl Model {
     }
 
     /// One update on transitions `rows` of the training demos; returns the loss before it and the norm of its gradient.
-    pub fn fine_tune(&mut self, rows: &[usize], mean_length: f32, learning_rate: f64) -> (f64, f64) {
-        let Model { dynamics, samples, weights, adams, work, .. } = self;
+    pub fn fine_tune(&mut self, corpus: &Corpus, rows: &[usize], mean_length: f32, learning_rate: f64) -> (f64, f64) {
+        let Model { dynamics, weights, adams, work } = self;
         let loss = model_loss(dynamics, weights, rows.len(), mean_length);
-        let l_model = work.loss(&dynamics.net, samples, rows, &loss, true);
+        let l_model = work.loss(&dynamics.net, &corpus.model_samples(dynamics), rows, &loss, true);
         let norm = clip_by_global_norm(&mut work.gradient, dynamics.settings().clip_norm);
         adams[0].step(&mut dynamics.net.params_mut(), &work.gradient, learning_rate);
         (l_model, norm)
@@ -50,6 +45,6 @@ impl Model {
 
     /// Loss on the validation demos.
     pub fn validation_loss(&mut self, held_out: &Corpus) -> f64 {
-        validation_loss(&self.dynamics, held_out, &self.held_out, &mut self.work)
+        validation_loss(&self.dynamics, held_out, &mut self.work)
     }
 }

@@ -1,7 +1,7 @@
 //! Losses of Algorithms 2 and 3 against finite differences, and the batched segments against Algorithm 3 step by step.
 
 use super::behavior_cloning::{self as bc, behavior_cloning, policy_gradient};
-use super::corpus::{Corpus, Samples, row};
+use super::corpus::{Corpus, row};
 use super::dynamics::Dynamics;
 use super::policy::Policy;
 use super::pushes::Pushes;
@@ -23,28 +23,18 @@ struct World {
     corpus: Corpus,
     policy: Policy,
     dynamics: Dynamics,
-    samples: Samples,
-    model_inputs: Vec<f32>,
     rows: Vec<usize>,
     settings: TrainSettings,
 }
 
 fn world(task: Task, structure: Structure, settings: TrainSettings) -> World {
-    let corpus = Corpus::new(&demos(task, 8, 20, 5), "training").expect("demos");
+    let corpus = Corpus::new(demos(task, 8, 20, 5), "training").expect("demos");
     let (mut rng, mut rows) = (stream(2, "world", 0), Vec::new());
     corpus.rows_of(&[6, 1, 3, 0, 5, 2, 4, 7], &mut rows);
     let policy = Policy::new(&corpus, &settings, &mut rng);
     let pretrain = PretrainSettings { structure, hidden_units: 16, features: settings.features, ..Default::default() };
     let dynamics = Dynamics::new(&corpus, &pretrain, &mut rng);
-    World {
-        samples: corpus.policy_samples(&policy),
-        model_inputs: corpus.model_samples(&dynamics).inputs,
-        rows,
-        corpus,
-        policy,
-        dynamics,
-        settings,
-    }
+    World { rows, corpus, policy, dynamics, settings }
 }
 
 fn small(settings: TrainSettings) -> TrainSettings {
@@ -53,7 +43,7 @@ fn small(settings: TrainSettings) -> TrainSettings {
 
 impl World {
     fn bc_loss(&self, work: &mut bc::Workspace) -> f64 {
-        let batch = bc::Batch { samples: &self.samples, rows: &self.rows, demos: 8.0 };
+        let batch = bc::Batch { samples: &self.corpus.policy_samples(&self.policy), rows: &self.rows, demos: 8.0 };
         behavior_cloning(&self.policy, batch, &bc::Choices::new(&self.settings), &mut stream(4, "noise", 0), work).l_bc
     }
 
@@ -78,15 +68,8 @@ impl World {
         self.bc_loss(&mut bc_work);
         let (noise, pushes) = (noise(&self.settings, self.rows.len()), self.pushes());
         let mean = bc_work.mean.clone();
-        let batch = sc::Batch {
-            corpus: &self.corpus,
-            model_inputs: &self.model_inputs,
-            rows: &self.rows,
-            demos: 8,
-            mean: &mean,
-            noise: &noise,
-            pushes: pushes.rows(),
-        };
+        let batch =
+            sc::Batch { corpus: &self.corpus, rows: &self.rows, demos: 8, mean: &mean, noise: &noise, pushes: pushes.rows() };
         let choices = sc::Choices::new(&self.settings, &self.corpus);
         let l_sc = state_cloning(&self.policy, &self.dynamics, batch, &self.segments(), &choices, &mut work);
         gradient.resize(self.policy.net.params().len(), 0.0);
@@ -240,7 +223,7 @@ fn step_by_step(world: &World, gradient: &mut [f32]) -> f64 {
             dynamics.net.forward(&mut f, t..t + 1);
             let mut prediction = s.clone();
             dynamics.write_next(&s, &action, f.output.panel(t), &mut prediction[..BASE_DIM]);
-            let target = row(&corpus.next, BASE_DIM, rows.start + t);
+            let target = corpus.next(rows.start + t);
             let coin = coins.random::<f64>() < settings.rho;
             let counts = !(coin && settings.sc_pairs == Pairs::AfterRecovery);
             let mut d_prediction = [Lanes::default(); BASE_DIM];

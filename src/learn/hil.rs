@@ -16,6 +16,7 @@ use crate::seed::stream;
 use crate::table::Table;
 use rand::seq::SliceRandom;
 use serde::{Deserialize, Serialize};
+use std::borrow::Cow;
 
 /// Which losses teach the policy.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -57,10 +58,10 @@ pub struct Trained {
 /// # Errors
 /// [`Error::Usage`] for a setting out of range or a missing dynamics network; [`Error::Failed`] without demos, for a dynamics network
 /// of another task, a checkpoint that does not fit, or when a loss is not a number; [`Error::Interrupted`]; what rollouts return.
-pub fn train(
+pub fn train<'a>(
     method: Method,
-    train: &[Demo],
-    validation: &[Demo],
+    train: impl Into<Cow<'a, [Demo]>>,
+    validation: impl Into<Cow<'a, [Demo]>>,
     dynamics: Option<Dynamics>,
     settings: &TrainSettings,
     seed: u64,

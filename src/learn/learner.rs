@@ -1,7 +1,7 @@
 //! The state of training between updates: networks, optimisers, workspaces, and the single steps that Algorithm 1 is made of.
 
 use super::behavior_cloning::{self as bc, Cloned, draw_noise, policy_gradient};
-use super::corpus::{Corpus, Samples};
+use super::corpus::Corpus;
 use super::dynamics::Dynamics;
 use super::fine_tuning::Model;
 use super::limits::{affordable, before_the_first_update};
@@ -17,6 +17,7 @@ use crate::math::ln;
 use crate::nn::{Adam, Ema, clip_by_global_norm, gaussian, global_norm};
 use crate::seed::stream;
 use crate::state::JOINTS;
+use std::borrow::Cow;
 
 /// A parameter vector's way down.
 pub(super) struct Descent {
@@ -46,9 +47,7 @@ pub struct Learner {
     pub(super) settings: TrainSettings,
     pub(super) policy: Policy,
     pub(super) averaged: Policy,
-    samples: Samples,
     held_out: Corpus,
-    held_out_samples: Samples,
     pub(super) model: Option<Model>,
     pub(super) net_descent: Descent,
     pub(super) std_descent: Descent,
@@ -70,9 +69,9 @@ impl Learner {
     ///
     /// # Errors
     /// [`Error::Failed`] without demos or when tasks differ.
-    pub fn new(
-        train: &[Demo],
-        validation: &[Demo],
+    pub fn new<'a>(
+        train: impl Into<Cow<'a, [Demo]>>,
+        validation: impl Into<Cow<'a, [Demo]>>,
         dynamics: Option<Dynamics>,
         settings: &TrainSettings,
         seed: u64,
@@ -95,14 +94,12 @@ impl Learner {
             "train.batch, train.bc_batch or train.hidden_units",
         )?;
         let policy = Policy::new(&corpus, settings, &mut stream(seed, "train.init", 0));
-        let model = dynamics.map(|dynamics| Model::new(dynamics, &corpus, &held_out));
+        let model = dynamics.map(Model::new);
         Ok(Learner {
             seed,
             updates: 0,
             skipped: 0,
             left_out: "",
-            samples: corpus.policy_samples(&policy),
-            held_out_samples: held_out.policy_samples(&policy),
             model,
             net_descent: Descent::new(policy.net.params(), settings.ema_decay),
             std_descent: Descent::new(&policy.log_std, settings.ema_decay),
@@ -159,7 +156,7 @@ impl Learner {
     pub fn behavior_cloning(&mut self, rows: &[usize], demos: f64) -> Result<Cloned> {
         self.draws += 1;
         let mut rng = stream(self.seed, "train.bc", self.draws);
-        let batch = bc::Batch { samples: &self.samples, rows, demos };
+        let batch = bc::Batch { samples: &self.corpus.policy_samples(&self.policy), rows, demos };
         let cloned = bc::behavior_cloning(&self.policy, batch, &self.bc_choices, &mut rng, &mut self.bc_work);
         self.finite("L_BC (Eq. 3)", cloned.l_bc, "lower train.learning_rate or train.warm_start_learning_rate")?;
         Ok(cloned)
@@ -182,7 +179,6 @@ impl Learner {
         self.pushes.draw(demos.iter().map(|d| self.corpus.demo(*d).len()), &mut rng);
         let batch = sc::Batch {
             corpus: &self.corpus,
-            model_inputs: &model.samples.inputs,
             rows,
             demos: demos.len(),
             mean: &self.bc_work.mean,
@@ -272,7 +268,7 @@ impl Learner {
         let Some(model) = &mut self.model else {
             return Ok(f64::NAN);
         };
-        let (l_model, norm) = model.fine_tune(rows, mean_length, learning_rate);
+        let (l_model, norm) = model.fine_tune(&self.corpus, rows, mean_length, learning_rate);
         let remedy = "lower train.dynamics_learning_rate";
         self.finite("the loss of the dynamics network (Eq. 6)", l_model, remedy)?;
         self.finite("the gradient of the dynamics network's loss (Eq. 6)", norm, remedy)?;
@@ -290,12 +286,14 @@ impl Learner {
         self.update_averaged();
         let rows: Vec<usize> = (0..self.held_out.rows()).collect();
         let demos = self.held_out.demos() as f64;
-        let batch = bc::Batch { samples: &self.held_out_samples, rows: &rows, demos };
+        let samples = self.held_out.policy_samples(&self.averaged);
+        let batch = bc::Batch { samples: &samples, rows: &rows, demos };
         let mut rng = stream(self.seed, "train.validate", self.draws);
         let work = &mut self.validation_work;
-        metrics.validation_l_bc = bc::behavior_cloning(&self.averaged, batch, &self.bc_choices, &mut rng, work).l_bc;
+        metrics.validation_l_bc = bc::validate(&self.averaged, batch, &self.bc_choices, &mut rng, work).l_bc;
         let scaling = self.averaged.action_scaling();
-        metrics.errors = action_errors(&self.held_out_samples, &work.mean, &scaling.std, &scaling.mean);
+        let label = |r: usize, i: usize| scaling.apply(i, self.held_out.commanded(r)[i]);
+        metrics.errors = action_errors(label, &work.mean, &scaling.std, &scaling.mean);
         if let Some(model) = &mut self.model {
             metrics.validation_l_model = model.validation_loss(&self.held_out);
         }

@@ -1,6 +1,6 @@
 //! What is known after each epoch of learning, and the table of all epochs.
 
-use super::corpus::{Samples, row};
+use super::corpus::row;
 use super::exact;
 use crate::state::{ARM_JOINTS, JOINTS};
 use crate::table::{Table, Values};
@@ -118,11 +118,11 @@ impl EpochMetrics {
     }
 }
 
-/// Errors of mean actions (standardised, rows x 9) against the labels, by what the labelled fingers do.
-pub(super) fn action_errors(samples: &Samples, mean: &[f32], unit: &[f32], offset: &[f32]) -> [ActionError; 3] {
+/// Errors of mean actions (standardised, rows x 9) against entry i of the label of row r, by what the labelled fingers do.
+pub(super) fn action_errors(label: impl Fn(usize, usize) -> f32, mean: &[f32], unit: &[f32], offset: &[f32]) -> [ActionError; 3] {
     let mut sums = [[0.0f64; 3]; 3]; // arm, fingers, rows
     for r in 0..mean.len() / JOINTS {
-        let (label, mean) = (row(&samples.targets, JOINTS, r), row(mean, JOINTS, r));
+        let (label, mean): ([f32; JOINTS], _) = (std::array::from_fn(|i| label(r, i)), row(mean, JOINTS, r));
         let fingers = (ARM_JOINTS..JOINTS).map(|i| offset[i] + unit[i] * label[i]).sum::<f32>() / (JOINTS - ARM_JOINTS) as f32;
         let class = 1 + usize::from(fingers > FINGER_COMMAND_RAD_S) - usize::from(fingers < -FINGER_COMMAND_RAD_S);
         let square = |i: usize| f64::from(unit[i] * (mean[i] - label[i])).powi(2);
@@ -200,10 +200,9 @@ mod tests {
     fn errors_go_to_the_class_of_the_labelled_fingers() {
         let mut targets = vec![0.0; 2 * JOINTS];
         targets[ARM_JOINTS..JOINTS].fill(0.8);
-        let samples = Samples { inputs: vec![], targets };
-        let mut mean = samples.targets.clone();
+        let mut mean = targets.clone();
         (0..ARM_JOINTS).for_each(|i| mean[i] += 0.1);
-        let errors = action_errors(&samples, &mean, &[2.0; JOINTS], &[0.0; JOINTS]);
+        let errors = action_errors(|r, i| targets[r * JOINTS + i], &mean, &[2.0; JOINTS], &[0.0; JOINTS]);
         assert!((errors[2].arm - 0.2).abs() < 1e-6 && errors[2].fingers == 0.0);
         assert!(errors[1].arm == 0.0 && errors[0].arm.is_nan());
     }

@@ -27,6 +27,7 @@ mod regression;
 mod resume_tests;
 mod rollout;
 mod run;
+mod samples;
 mod scaling;
 mod selection;
 mod shards;

@@ -1,6 +1,6 @@
 //! How far the dynamics network is off on unseen demos, beside two models that know nothing.
 
-use super::corpus::{Corpus, row};
+use super::corpus::Corpus;
 use super::dynamics::{DT_S, Dynamics};
 use crate::error::Result;
 use crate::interrupt::Interrupt;
@@ -75,12 +75,12 @@ fn errors(
     for demo in (0..corpus.demos()).map(|i| corpus.demo(i)).filter(|d| d.len() >= steps) {
         interrupt.check()?;
         let rows = demo.len() + 1 - steps;
-        let mut states = corpus.states[demo.start * dim..(demo.start + rows) * dim].to_vec();
+        let mut states = (demo.start..demo.start + rows).flat_map(|r| corpus.state(r)).copied().collect::<Vec<f32>>();
         for k in 0..steps {
             advance(dynamics, corpus, model, demo.start + k, &mut states, &mut pass);
         }
         for (r, state) in states.chunks_exact(dim).enumerate() {
-            let truth = row(&corpus.next, BASE_DIM, demo.start + r + steps - 1);
+            let truth = corpus.next(demo.start + r + steps - 1);
             sums.iter_mut().zip(&GROUPS).for_each(|(sum, group)| *sum += square_error(state, truth, group));
         }
         count += rows;
@@ -91,7 +91,7 @@ fn errors(
 /// One step of all `states`; row r is given the executed action of transition `first + r`.
 fn advance(dynamics: &Dynamics, corpus: &Corpus, model: Model, first: usize, states: &mut [f32], pass: &mut Pass) {
     let dim = corpus.task.state_dim();
-    let action = |r: usize| row(&corpus.executed, JOINTS, first + r);
+    let action = |r: usize| corpus.executed(first + r);
     match model {
         Model::Unchanged => {}
         Model::Integrated => {

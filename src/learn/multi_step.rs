@@ -1,7 +1,7 @@
 //! The loss of the dynamics network over several steps (`pretrain.steps`): it runs on its own predictions under the actions that a demo
 //! executed, every prediction is compared with the demo's state (Eq. 6), and the gradient comes back through time.
 
-use super::corpus::{Corpus, row};
+use super::corpus::Corpus;
 use super::dynamics::Dynamics;
 use super::hand::Hand;
 use super::regression::{Loss, bend, knee};
@@ -100,7 +100,7 @@ impl Shard {
         let ((from, panels), seen) = (self.depth(j), dynamics.features().width());
         let (dim, rollouts) = (corpus.task.state_dim(), &self.rollouts);
         self.rows.reserve(JOINTS, panels);
-        self.rows.write_rows(0, self.counts[j], |i| row(&corpus.executed, JOINTS, rollouts[i].0 + j));
+        self.rows.write_rows(0, self.counts[j], |i| corpus.executed(rollouts[i].0 + j));
         for at in from..from + panels {
             let (state, input) = (self.states.panel(at), self.pass.input.panel_mut(at));
             self.hands[at] = dynamics.features().hand(state);
@@ -126,7 +126,7 @@ impl Shard {
         let ((from, panels), rollouts) = (self.depth(j), &self.rollouts);
         let (std, knee) = (&dynamics.residual_scaling().std, knee(loss.huber));
         self.rows.reserve(BASE_DIM, panels);
-        self.rows.write_rows(0, self.counts[j], |i| row(&corpus.next, BASE_DIM, rollouts[i].0 + j));
+        self.rows.write_rows(0, self.counts[j], |i| corpus.next(rollouts[i].0 + j));
         for at in from..from + panels {
             let (targets, d_state) = (self.rows.panel(at - from), self.d_states.panel_mut(at - from));
             let (d_output, filled) = (self.pass.d_output.panel_mut(at), self.counts[j] - (at - from) * LANES);
@@ -173,7 +173,7 @@ mod tests {
             let states = random_states(Task::Stack, 41, i);
             Demo::new(Task::Stack, states, like.actions().to_vec(), like.executed().to_vec()).expect("lengths match")
         };
-        let corpus = Corpus::new(&(0..3).map(jumping).collect::<Vec<_>>(), "training").expect("demos");
+        let corpus = Corpus::new((0..3).map(jumping).collect::<Vec<_>>(), "training").expect("demos");
         let settings = PretrainSettings { structure, features: FeatureSet::Fk, hidden_units: 6, ..Default::default() };
         (Dynamics::new(&corpus, &settings, &mut stream(2, "test", 0)), corpus)
     }
@@ -225,7 +225,7 @@ mod tests {
 
     #[test]
     fn rollouts_end_with_their_demo() {
-        let corpus = Corpus::new(&demos(Task::PickUp, 2, 10, 0), "training").expect("demos");
+        let corpus = Corpus::new(demos(Task::PickUp, 2, 10, 0), "training").expect("demos");
         let steps: Vec<_> = horizons(&corpus, &[0, 8, 9, 10, 20], 5).collect();
         assert_eq!(steps, [(0, 5), (8, 2), (9, 1), (10, 5), (20, 1)]);
     }

@@ -37,7 +37,7 @@ pub struct Policy {
 impl Policy {
     /// A policy with random weights; scalings and horizon from the training demos.
     pub(super) fn new(corpus: &Corpus, settings: &TrainSettings, rng: &mut impl Rng) -> Self {
-        let features = Features::fit(corpus.task, settings.features, settings.mask_dq, &corpus.states);
+        let features = Features::fit(corpus, settings.features, settings.mask_dq);
         let mut widths = vec![settings.hidden_units; settings.hidden_layers + 2];
         (widths[0], widths[settings.hidden_layers + 1]) = (features.width(), JOINTS);
         let mut lengths: Vec<usize> = (0..corpus.demos()).map(|i| corpus.demo(i).len()).collect();
@@ -47,7 +47,7 @@ impl Policy {
             task: corpus.task,
             horizon_steps: (HORIZON_OVER_P95 * p95) as u32,
             features,
-            action: Scaling::fit(&corpus.commanded, JOINTS, ACTION_FLOOR_RAD_S),
+            action: Scaling::fit(corpus.rows(), JOINTS, ACTION_FLOOR_RAD_S, |r, row| row.copy_from_slice(corpus.commanded(r))),
             net: Mlp::new(&widths, settings.activation, rng),
             log_std: vec![ln(settings.initial_std.max(settings.std_floor)) as f32; JOINTS],
             settings: settings.clone(),
@@ -167,7 +167,7 @@ mod tests {
 
     #[test]
     fn a_policy_survives_its_tensors_and_refuses_wrong_ones() {
-        let corpus = Corpus::new(&demos(Task::Stack, 3, 20, 0), "training").expect("demos");
+        let corpus = Corpus::new(demos(Task::Stack, 3, 20, 0), "training").expect("demos");
         let policy = Policy::new(&corpus, &TrainSettings::default(), &mut stream(0, "test", 0));
         assert_eq!(policy.horizon_steps(), 44);
         let (tensors, meta) = (policy.to_tensors(), policy.meta());
@@ -189,7 +189,7 @@ mod tests {
 
     #[test]
     fn a_description_out_of_its_limits_is_refused_before_anything_is_made_of_it() {
-        let corpus = Corpus::new(&demos(Task::Stack, 3, 20, 0), "training").expect("demos");
+        let corpus = Corpus::new(demos(Task::Stack, 3, 20, 0), "training").expect("demos");
         let policy = Policy::new(&corpus, &TrainSettings::default(), &mut stream(0, "test", 0));
         for (key, value, said) in [
             ("hidden", json!([0]), "is [0]: networks have 1 to 16 hidden layers of 1 to 4096 units"),
@@ -221,7 +221,7 @@ mod tests {
 
     #[test]
     fn samples_scatter_around_the_mean() {
-        let corpus = Corpus::new(&demos(Task::PickUp, 2, 20, 0), "training").expect("demos");
+        let corpus = Corpus::new(demos(Task::PickUp, 2, 20, 0), "training").expect("demos");
         let policy = Policy::new(&corpus, &TrainSettings::default(), &mut stream(0, "test", 0));
         let (row, mut rng) = (corpus.state(3), stream(1, "test", 0));
         let mean = policy.act(row);

@@ -1,6 +1,6 @@
 //! Algorithm 4: pretraining the dynamics network on the transitions that the demos observed.
 
-use super::corpus::{Corpus, Samples};
+use super::corpus::Corpus;
 use super::dynamics::Dynamics;
 use super::limits::{affordable, before_the_first_update};
 use super::metrics::{EpochMetrics, Mean, table};
@@ -16,15 +16,16 @@ use crate::nn::{Adam, Ema, clip_by_global_norm, cosine};
 use crate::seed::stream;
 use crate::state::BASE_DIM;
 use rand::seq::SliceRandom;
+use std::borrow::Cow;
 
 /// Learns f_phi from the executed actions of `train`; `log` is called after every epoch.
 ///
 /// # Errors
 /// [`Error::Usage`] for a setting out of range; [`Error::Failed`] without demos or when the loss is not a number;
 /// [`Error::Interrupted`].
-pub fn pretrain_dynamics(
-    train: &[Demo],
-    validation: &[Demo],
+pub fn pretrain_dynamics<'a>(
+    train: impl Into<Cow<'a, [Demo]>>,
+    validation: impl Into<Cow<'a, [Demo]>>,
     settings: &PretrainSettings,
     seed: u64,
     log: &mut dyn FnMut(&EpochMetrics),
@@ -38,7 +39,6 @@ pub fn pretrain_dynamics(
         affordable(rows * settings.steps, settings.hidden_layers, settings.hidden_units, keys)?;
     }
     let mut dynamics = Dynamics::new(&corpus, settings, &mut stream(seed, "pretrain.init", 0));
-    let held_out_samples = held_out.model_samples(&dynamics);
     let mut lesson = Lesson::new(&corpus, &dynamics);
     let batches = Batches::new(&corpus, settings.batch_rows);
     let total = settings.epochs * batches.per_epoch();
@@ -68,7 +68,7 @@ pub fn pretrain_dynamics(
             }
             averaged.net.params_mut().copy_from_slice(ema.average());
             (metrics.updates, metrics.l_model) = (updates, mean.get());
-            metrics.validation_l_model = validation_loss(&averaged, &held_out, &held_out_samples, &mut work);
+            metrics.validation_l_model = validation_loss(&averaged, &held_out, &mut work);
             check_validation(&metrics)?;
             log(&metrics);
             let flat = patience.ends_after(metrics.validation_l_model);
@@ -107,7 +107,6 @@ fn check_validation(row: &EpochMetrics) -> Result<()> {
 /// What there is to learn from, and how: Eq. 6, or the same over several steps.
 struct Lesson<'a> {
     corpus: &'a Corpus,
-    samples: Samples,
     weights: Vec<f32>,
     mean_length: f32,
     one_step: Regression,
@@ -118,7 +117,6 @@ impl<'a> Lesson<'a> {
     fn new(corpus: &'a Corpus, dynamics: &Dynamics) -> Self {
         Lesson {
             corpus,
-            samples: corpus.model_samples(dynamics),
             weights: loss_weights(dynamics),
             mean_length: corpus.rows() as f32 / corpus.demos() as f32,
             one_step: Regression::default(),
@@ -131,7 +129,8 @@ impl<'a> Lesson<'a> {
         let steps = dynamics.settings().steps;
         if steps == 1 {
             let loss = model_loss(dynamics, &self.weights, rows.len(), self.mean_length);
-            return (self.one_step.loss(&dynamics.net, &self.samples, rows, &loss, true), &mut self.one_step.gradient);
+            let samples = self.corpus.model_samples(dynamics);
+            return (self.one_step.loss(&dynamics.net, &samples, rows, &loss, true), &mut self.one_step.gradient);
         }
         let pairs = horizons(self.corpus, rows, steps).map(|(_, steps)| steps).sum();
         let loss = model_loss(dynamics, &self.weights, pairs, self.mean_length);
@@ -140,11 +139,11 @@ impl<'a> Lesson<'a> {
 }
 
 /// Loss on all of the validation transitions.
-pub(super) fn validation_loss(dynamics: &Dynamics, corpus: &Corpus, samples: &Samples, work: &mut Regression) -> f64 {
+pub(super) fn validation_loss(dynamics: &Dynamics, corpus: &Corpus, work: &mut Regression) -> f64 {
     let rows: Vec<usize> = (0..corpus.rows()).collect();
     let weights = loss_weights(dynamics);
     let loss = model_loss(dynamics, &weights, rows.len(), corpus.rows() as f32 / corpus.demos() as f32);
-    work.loss(&dynamics.net, samples, &rows, &loss, false)
+    work.loss(&dynamics.net, &corpus.model_samples(dynamics), &rows, &loss, false)
 }
 
 /// The weight of each entry in Eq. 6.

@@ -1,8 +1,8 @@
 //! Supervised learning of a network by minibatches, in shards: how the dynamics network learns from observed transitions (Eq. 6).
 
-use super::corpus::{Samples, row};
+use super::samples::Samples;
 use super::shards;
-use crate::nn::{BLOCK_PANELS, LANES, Lanes, Mlp, Pass, kernel, panels_of};
+use crate::nn::{BLOCK_PANELS, LANES, Lanes, Mlp, Pass, panels_of};
 use rayon::prelude::*;
 
 /// Where Huber's function turns from a parabola into a line, in standard deviations.
@@ -35,7 +35,7 @@ struct Shard {
 
 impl Regression {
     /// Loss of the network on `rows` of `samples`; with `learn`, its gradient too.
-    pub fn loss(&mut self, net: &Mlp, samples: &Samples, rows: &[usize], loss: &Loss, learn: bool) -> f64 {
+    pub fn loss(&mut self, net: &Mlp, samples: &impl Samples, rows: &[usize], loss: &Loss, learn: bool) -> f64 {
         let active = shards::count(rows.len());
         self.shards.resize_with(shards::MAX_SHARDS, Shard::default);
         self.shards.iter_mut().for_each(|shard| shard.reserve(net));
@@ -56,7 +56,7 @@ impl Shard {
         self.pass.reserve(net, BLOCK_PANELS);
     }
 
-    fn run(&mut self, net: &Mlp, samples: &Samples, rows: &[usize], loss: &Loss, learn: bool) {
+    fn run(&mut self, net: &Mlp, samples: &impl Samples, rows: &[usize], loss: &Loss, learn: bool) {
         self.loss = 0.0;
         net.begin_gradient(&mut self.pass);
         for rows in rows.chunks(BLOCK_PANELS * LANES) {
@@ -64,9 +64,9 @@ impl Shard {
         }
     }
 
-    fn block(&mut self, net: &Mlp, samples: &Samples, rows: &[usize], loss: &Loss, learn: bool) {
+    fn block(&mut self, net: &Mlp, samples: &impl Samples, rows: &[usize], loss: &Loss, learn: bool) {
         let panels = panels_of(rows.len());
-        self.pass.input.write_rows(0, rows.len(), |slot| row(&samples.inputs, net.inputs(), rows[slot]));
+        samples.write_inputs(rows, &mut self.pass.input);
         net.forward(&mut self.pass, 0..panels);
         for (p, rows) in rows.chunks(LANES).enumerate() {
             self.panel_loss(samples, p, rows, loss);
@@ -77,10 +77,9 @@ impl Shard {
     }
 
     /// Loss of one panel, and its gradient; lanes without a row have no error.
-    fn panel_loss(&mut self, samples: &Samples, p: usize, rows: &[usize], loss: &Loss) {
+    fn panel_loss(&mut self, samples: &impl Samples, p: usize, rows: &[usize], loss: &Loss) {
         let (output, d_output) = (self.pass.output.panel(p), self.pass.d_output.panel_mut(p));
-        let target = |lane: usize| row(&samples.targets, output.len(), rows[lane.min(rows.len() - 1)]);
-        kernel::interleave(d_output, std::array::from_fn(target));
+        samples.write_targets(rows, d_output);
         if rows.len() < LANES {
             d_output.iter_mut().zip(output).for_each(|(target, output)| target.take_from(rows.len(), *output));
         }
@@ -118,16 +117,32 @@ pub(super) fn bend(error: Lanes, knee: f32) -> Lanes {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::nn::Activation;
+    use crate::learn::corpus::row;
+    use crate::nn::{Activation, Panels, kernel};
     use crate::seed::stream;
     use rand::RngExt;
+
+    struct Table {
+        inputs: Vec<f32>,
+        targets: Vec<f32>,
+    }
+
+    impl Samples for Table {
+        fn write_inputs(&self, rows: &[usize], to: &mut Panels) {
+            to.write_rows(0, rows.len(), |slot| row(&self.inputs, 3, rows[slot]));
+        }
+
+        fn write_targets(&self, rows: &[usize], panel: &mut [Lanes]) {
+            kernel::interleave(panel, std::array::from_fn(|lane| row(&self.targets, 2, rows[lane.min(rows.len() - 1)])));
+        }
+    }
 
     #[test]
     fn gradients_of_square_and_huber_equal_finite_differences() {
         let mut rng = stream(3, "regression", 0);
         let mut net = Mlp::new(&[3, 8, 2], Activation::Tanh, &mut rng);
         let mut random = |n: usize, size: f32| -> Vec<f32> { (0..n).map(|_| size * (rng.random::<f32>() - 0.5)).collect() };
-        let samples = Samples { inputs: random(200 * 3, 2.0), targets: random(200 * 2, 6.0) };
+        let samples = Table { inputs: random(200 * 3, 2.0), targets: random(200 * 2, 6.0) };
         let rows: Vec<usize> = (0..200).collect();
         for huber in [false, true] {
             let loss = Loss { weights: &[1.0, 0.5], scale: 1.0 / 400.0, huber };

@@ -180,8 +180,7 @@ impl Rollout {
         self.d_states.span_mut(&(0..first)).fill(Lanes::default());
         let demo_row = |i: usize| batch.rows[self.segments[i].start];
         self.states.write_rows(0, self.segments.len(), |i| batch.corpus.state(demo_row(i)));
-        let inputs = |i: usize| row(batch.model_inputs, dynamics.inputs(), demo_row(i));
-        self.model.input.write_rows(0, self.segments.len(), inputs);
+        batch.corpus.write_features(dynamics.features(), self.segments.len(), demo_row, &mut self.model.input);
     }
 
     /// One step forward: a_t from the policy, s_{t+1} from the dynamics network.
@@ -276,7 +275,7 @@ impl Rollout {
     fn add_loss(&mut self, depth: Depth, p: usize, at: usize, dynamics: &Dynamics, batch: Batch, choices: &Choices) {
         let scale = choices.scale(batch.rows.len(), batch.demos);
         let (segments, mut targets) = (depth.segments(p), [Lanes::default(); BASE_DIM]);
-        let target = |i: usize| row(&batch.corpus.next, BASE_DIM, batch.rows[self.segments[i].start + depth.j]);
+        let target = |i: usize| batch.corpus.next(batch.rows[self.segments[i].start + depth.j]);
         kernel::interleave(&mut targets, std::array::from_fn(|lane| target((segments.start + lane).min(segments.end - 1))));
         if segments.len() < LANES {
             let predictions = self.predictions.panel(at); // no error where there is no segment

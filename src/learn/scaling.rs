@@ -10,18 +10,18 @@ pub struct Scaling {
 }
 
 impl Scaling {
-    /// Statistics of `rows` (row-major, `width` wide). A smaller spread than `floor` counts as noise and is not blown up.
-    pub fn fit(rows: &[f32], width: usize, floor: f32) -> Self {
-        if width == 0 {
-            return Scaling::default();
-        }
-        let n = (rows.len() / width).max(1) as f64;
+    /// Statistics of so many `rows` of `width` numbers, each of which `write` writes twice. A smaller spread than `floor` counts as noise
+    /// and is not blown up.
+    pub fn fit(rows: usize, width: usize, floor: f32, mut write: impl FnMut(usize, &mut [f32])) -> Self {
+        let (n, mut row) = (rows.max(1) as f64, vec![0.0; width]);
         let mut mean = vec![0.0f64; width];
-        for row in rows.chunks_exact(width) {
-            mean.iter_mut().zip(row).for_each(|(m, v)| *m += f64::from(*v) / n);
+        for r in 0..rows {
+            write(r, &mut row);
+            mean.iter_mut().zip(&row).for_each(|(m, v)| *m += f64::from(*v) / n);
         }
         let mut variance = vec![0.0f64; width];
-        for row in rows.chunks_exact(width) {
+        for r in 0..rows {
+            write(r, &mut row);
             let pairs = variance.iter_mut().zip(row.iter().zip(&mean));
             pairs.for_each(|(s, (v, m))| *s += (f64::from(*v) - m).powi(2) / n);
         }
@@ -55,7 +55,7 @@ mod tests {
 
     #[test]
     fn statistics_and_the_floor() {
-        let scaling = Scaling::fit(&[1.0, 5.0, 3.0, 5.0], 2, 0.1);
+        let scaling = Scaling::fit(2, 2, 0.1, |r, row| row.copy_from_slice(&[[1.0, 5.0], [3.0, 5.0]][r]));
         assert_eq!(scaling.mean, [2.0, 5.0]);
         assert_eq!(scaling.std, [1.0, 0.1]);
         assert_eq!(scaling.undo(0, scaling.apply(0, 7.0)), 7.0);

@@ -4,7 +4,7 @@
 //! that begin at demo states, and the segments of all demos advance together as rows of one matrix. Sequential depth is the longest
 //! segment. The first action of a segment is the policy's action in a demo state, which behavior cloning has already computed.
 
-use super::corpus::{Corpus, row};
+use super::corpus::Corpus;
 use super::dynamics::{DT_S, Dynamics, STEP_FLOOR};
 use super::policy::Policy;
 use super::rollout::Rollout;
@@ -62,8 +62,8 @@ const FOLLOWING: f32 = 0.5;
 fn taught_fingers(fingers: FingerCloning, corpus: &Corpus, r: usize) -> [f32; FINGERS] {
     std::array::from_fn(|finger| {
         let i = ARM_JOINTS + finger;
-        let commanded = DT_S * row(&corpus.executed, JOINTS, r)[i];
-        let missed = row(&corpus.next, BASE_DIM, r)[i] - corpus.state(r)[i] - commanded;
+        let commanded = DT_S * corpus.executed(r)[i];
+        let missed = corpus.next(r)[i] - corpus.state(r)[i] - commanded;
         f32::from(match fingers {
             FingerCloning::All => true,
             FingerCloning::Following => missed.abs() <= FOLLOWING * commanded.abs(),
@@ -96,11 +96,15 @@ impl Choices {
         let dim = corpus.task.state_dim();
         let std = match (settings.loss, settings.sc_scale) {
             (Objective::RawSum, _) => vec![1.0; BASE_DIM],
-            (_, StateScale::State) => Scaling::fit(&corpus.states, dim, STATE_FLOOR).std,
+            (_, StateScale::State) => {
+                Scaling::fit(corpus.rows(), dim, STATE_FLOOR, |r, row| row.copy_from_slice(corpus.state(r))).std
+            }
             (_, StateScale::Step) => {
-                let rows = corpus.next.chunks_exact(BASE_DIM).zip(corpus.states.chunks_exact(dim));
-                let changes: Vec<f32> = rows.flat_map(|(next, s)| next.iter().zip(s).map(|(n, s)| n - s)).collect();
-                Scaling::fit(&changes, BASE_DIM, STEP_FLOOR).std
+                let change = |r: usize, row: &mut [f32]| {
+                    let entries = row.iter_mut().zip(corpus.next(r).iter().zip(corpus.state(r)));
+                    entries.for_each(|(change, (next, state))| *change = next - state);
+                };
+                Scaling::fit(corpus.rows(), BASE_DIM, STEP_FLOOR, change).std
             }
         };
         let velocity = |i: usize| (JOINTS..2 * JOINTS).contains(&i);
@@ -133,8 +137,6 @@ impl Choices {
 pub struct Batch<'a> {
     /// The training demos.
     pub corpus: &'a Corpus,
-    /// The dynamics network's inputs in the demos' own states (the action is overwritten).
-    pub model_inputs: &'a [f32],
     /// Transitions of the corpus, demo by demo.
     pub rows: &'a [usize],
     /// Number of demos.

@@ -123,13 +123,13 @@ impl Cells {
         }
     }
 
-    /// Shows every value with its place in its row of `width`, and with a key that sorts as the values do.
+    /// Shows every value, column by column, with its place in its row of `width` and with a key that sorts as the values do.
     pub(super) fn for_each(&self, width: usize, mut take: impl FnMut(usize, f64, u64)) {
         let key = |x: f32| u64::from(if x.is_sign_negative() { !x.to_bits() } else { x.to_bits() | F32_SIGN as u32 });
         match self {
-            Cells::F32(v) => by_row(v, width, |at, x| take(at, f64::from(x), key(x))),
-            Cells::I64(v) => by_row(v, width, |at, x| take(at, x as f64, x as u64 ^ I64_SIGN)),
-            Cells::Bool(v) => by_row(v, width, |at, x| take(at, f64::from(u8::from(x)), u64::from(x))),
+            Cells::F32(v) => by_column(v, width, |at, x| take(at, f64::from(x), key(x))),
+            Cells::I64(v) => by_column(v, width, |at, x| take(at, x as f64, x as u64 ^ I64_SIGN)),
+            Cells::Bool(v) => by_column(v, width, |at, x| take(at, f64::from(u8::from(x)), u64::from(x))),
         }
     }
 
@@ -166,8 +166,9 @@ impl Cells {
     }
 }
 
-fn by_row<T: Copy>(values: &[T], width: usize, mut take: impl FnMut(usize, T)) {
-    values.chunks_exact(width).for_each(|row| row.iter().enumerate().for_each(|(at, x)| take(at, *x)));
+/// One column after the other.
+fn by_column<T: Copy>(values: &[T], width: usize, mut take: impl FnMut(usize, T)) {
+    (0..width).for_each(|at| values.iter().skip(at).step_by(width).for_each(|x| take(at, *x)));
 }
 
 /// The Arrow field of a feature, its description and names in the metadata.

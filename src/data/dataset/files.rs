@@ -134,7 +134,11 @@ impl<'a> Series<'a> {
         };
         open.append(group).map_err(|e| self.cannot_encode(e))?;
         open.flush()?;
-        if open.writer.bytes_written() >= self.file_bytes { self.close(open) } else { Ok(self.open = Some(open)) }
+        if open.writer.bytes_written() >= self.file_bytes {
+            return self.close(open);
+        }
+        self.open = Some(open);
+        Ok(())
     }
 
     /// The paths below the root and the hashes of all files, in their order.

@@ -2,7 +2,7 @@
 
 use super::{answer, statistics};
 use crate::data::dataset;
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::state::{JOINTS, State, action_names};
 use serde_json::{Map, Value, json};
 use std::path::Path;
@@ -20,11 +20,14 @@ pub(super) fn one(root: &Path) -> Result<Value> {
         executed.add(episode.demo.executed(), JOINTS);
     })?;
     // The squares of the distances from the means, which are known now.
-    dataset::each(root, |episode| {
+    let again = dataset::each(root, |episode| {
         states.add_squares(episode.demo.states());
         actions.add_squares(episode.demo.actions());
         executed.add_squares(episode.demo.executed());
     })?;
+    if again != found {
+        return Err(Error::input(root, "changed while it was read; run hilt inspect again"));
+    }
     let rest = json!({
         "task": found.task,
         "instruction": found.task.instruction(),
