@@ -1,7 +1,7 @@
 //! `plan` and `simulate` that stop and go on, and their work shared among machines: always the bytes of one undisturbed run.
 
 use crate::interrupted::{signal, start};
-use crate::runs::{HILT, Run, contents, hilt, text};
+use crate::runs::{Run, contents, hilt, text};
 use std::collections::BTreeMap;
 use std::fs;
 use std::os::unix::fs::MetadataExt;
@@ -18,18 +18,18 @@ const PATIENCE: Duration = Duration::from_secs(120);
 type Harm = fn(&[u8]) -> Vec<u8>;
 
 /// The arguments of a stage with further words; the last of a flag counts.
-fn with(run: &Run, stage: &str, further: &[&str]) -> Vec<String> {
+pub fn with(run: &Run, stage: &str, further: &[&str]) -> Vec<String> {
     run.words(stage).into_iter().chain(further.iter().map(|w| w.to_string())).collect()
 }
 
-fn done(words: Vec<String>) -> String {
+pub fn done(words: Vec<String>) -> String {
     let output = hilt(words);
     assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
     text(&output.stderr)
 }
 
 /// The pieces of the one run that has some in a directory, by their names.
-fn pieces(unfinished: &Path) -> BTreeMap<String, PathBuf> {
+pub fn pieces(unfinished: &Path) -> BTreeMap<String, PathBuf> {
     let paths = |dir: &Path| fs::read_dir(dir).into_iter().flatten().flatten().map(|e| e.path()).collect::<Vec<_>>();
     let files = paths(unfinished).iter().flat_map(|run| paths(run)).collect::<Vec<_>>();
     let name = |path: &PathBuf| path.file_name().expect("a name").to_str().expect("UTF-8").to_string();
@@ -226,36 +226,4 @@ fn inspect_says_what_a_directory_of_pieces_is() {
     let run = Run::finished();
     done(with(&run, "simulate", &["--shard", "1/2"]));
     run.refuses(vec!["inspect".into(), run.name("recordings.unfinished")], &["is not finished", "run its command again"]);
-}
-
-/// A minute: `cargo test --release --locked --test pipeline ten_kills -- --ignored --nocapture`.
-#[test]
-#[ignore = "takes a minute"]
-fn ten_kills_at_moments_of_plan_and_simulate_leave_the_bytes_of_an_undisturbed_run() {
-    const MOMENTS: u32 = 5;
-    let whole = Run::new("pick-up", 0);
-    for (stage, flags, artefact) in
-        [("plan", ["--episodes", "400"], "plans.parquet"), ("simulate", ["--episodes", "60"], "recordings")]
-    {
-        let began = Instant::now();
-        done(with(&whole, stage, &flags));
-        let undisturbed = began.elapsed();
-        for moment in 1..=MOMENTS {
-            let run = Run::new("pick-up", 0);
-            if stage == "simulate" {
-                fs::copy(whole.at("plans.parquet"), run.at("plans.parquet")).expect("copied");
-            }
-            let mut child = Command::new(HILT).args(with(&run, stage, &flags)).arg("--quiet").spawn().expect("the binary runs");
-            let wait = undisturbed * moment / (MOMENTS + 1);
-            std::thread::sleep(wait);
-            child.kill().expect("killed");
-            child.wait().expect("ended");
-            let kept = run.at(artefact).with_extension("unfinished");
-            let (count, there) = (pieces(&kept).len(), run.at(artefact).exists());
-            let words = done(with(&run, stage, &flags));
-            assert_eq!(words.contains("goes on: "), count > 0, "{words}");
-            println!("{stage} killed after {wait:.1?} of {undisturbed:.1?}: {count} pieces kept, artefact there: {there}");
-            run.unchanged(stage, &contents(whole.path()));
-        }
-    }
 }

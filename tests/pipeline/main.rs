@@ -8,6 +8,7 @@ mod ends;
 mod fixtures;
 mod full_disk;
 mod interrupted;
+mod kills;
 mod leaks;
 mod places;
 mod reproducible;

@@ -12,7 +12,7 @@ use std::time::Duration;
 const TRIES: usize = 20;
 const PAUSE: Duration = Duration::from_millis(1);
 
-/// Writes one file of very many into a directory that is there: as [`write_bytes`], but the directory is looked at neither before nor after.
+/// Writes one file of very many into a directory that is there: as [`super::write_bytes`], but the directory is looked at neither before nor after.
 ///
 /// # Errors
 /// [`Error::Io`] when the system refuses.
