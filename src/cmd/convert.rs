@@ -29,9 +29,9 @@ pub struct Args {
 /// For when no episode succeeded.
 const ADVICE: &str = "record again with less noise (simulate.noise_variance), or keep them with convert.keep_failed=true";
 
-/// Demos are kept from the first reading up to so many bytes of their numbers, some 4,000 pick-ups; the others are read a second time, so
+/// Demos are kept from the first reading up to so many bytes of their numbers, some 1,500 pick-ups; the others are read a second time, so
 /// that memory does not grow with the number of recordings.
-const HELD_BYTES: usize = 64 << 20;
+const HELD_BYTES: usize = 24 << 20;
 
 /// What is kept of a recording that was read.
 struct Found {
