@@ -23,8 +23,7 @@ pub struct Physics {
     /// the paper's variance: stacks 90 of 100; with 3 substeps 64) and 6 sweeps (8 stack as many and cost a fifth more time; 2 lose one
     /// grasp in seven).
     pub near: Grain,
-    /// While nothing can touch the robot within a control step and the blocks rest. Default: two substeps of 25 ms, which the motors' motion
-    /// does not tell from eight (measured: 1.2 times the control steps per second, the same stacks; with one substep a block walks).
+    /// While nothing can touch the robot within a control step and the blocks rest. Default: the same.
     pub free: Grain,
     /// Sweeps that take out the velocity with which penetration was pushed out.
     pub relaxations: usize,
@@ -45,7 +44,7 @@ impl Default for Physics {
         let grain = Grain { steps: 2, substeps: 4, sweeps: 6 };
         Physics {
             near: grain,
-            free: Grain { steps: 1, substeps: 2, ..grain },
+            free: grain,
             relaxations: 1,
             contact_hz: 200.0,
             contact_damping: 2.0,
