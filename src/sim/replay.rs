@@ -90,7 +90,8 @@ mod tests {
         let settings = SceneSettings { obstacles: vec![touching], ..SceneSettings::default() };
         let scene = draw_scene(Task::PickUp, &SceneSettings::default(), &mut stream(3, "scene", 0)).expect("there is room");
         let start = World::new(&scene).observe().state.to_row();
-        let (states, still) = ([start.clone(), start].concat(), vec![0.0; JOINTS]);
+        const STEPS: usize = 100;
+        let (states, still) = (start.repeat(STEPS + 1), vec![0.0; STEPS * JOINTS]);
         let demo = Demo::new(Task::PickUp, states, still.clone(), still).expect("lengths match");
         let episode = reexecute(0, &demo, &settings, &SimulateSettings::default(), stream(4, "noise", 0), &Interrupt::default());
         assert_eq!(episode.expect("no error").failure, Some(FailureClass::SimulationBrokeDown));

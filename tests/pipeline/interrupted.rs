@@ -72,7 +72,7 @@ fn planning_learning_and_evaluation_stop() {
     let by_planner = by_planner.into_iter().map(|w| if w == policy { "planner".into() } else { w }).collect();
     for words in [
         long(&run, "plan", &["--episodes", "100000"]),
-        long(&run, "pretrain", &["--set", "pretrain.epochs=1000000"]),
+        long(&run, "pretrain", &["--set", "pretrain.epochs=1000000", "--set", "pretrain.patience=0"]),
         long(&run, "train", &["--set", "train.warm_start_updates=10000000"]),
         long(&run, "train", &["--set", "train.epochs=1000000", "--method", "sc"]),
         long(&run, "evaluate", &["--episodes", "100000"]),
