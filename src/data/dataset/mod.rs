@@ -96,8 +96,8 @@ impl<'a> From<&'a [DatasetEpisode]> for Episodes<'a> {
 /// Writes one dataset; an older one there is replaced when the new one is whole.
 ///
 /// # Errors
-/// [`Error::Input`] without episodes, for a demo of another task, for rewards that do not fit or are not finite, or when the place
-/// holds something else; [`Error::Io`] when the system refuses; what giving an episode returns.
+/// [`crate::error::Error::Input`] without episodes, for a demo of another task, for rewards that do not fit or are not finite, or when the place
+/// holds something else; [`crate::error::Error::Io`] when the system refuses; what giving an episode returns.
 pub fn write(root: &Path, task: Task, episodes: &Episodes, provenance: &Provenance) -> Result<()> {
     let interrupt = Interrupt::default();
     let content = Content::new(task, provenance, &interrupt);
@@ -108,7 +108,7 @@ pub fn write(root: &Path, task: Task, episodes: &Episodes, provenance: &Provenan
 /// there is no validation root.
 ///
 /// # Errors
-/// As [`write()`]; [`Error::Interrupted`].
+/// As [`write()`]; [`crate::error::Error::Interrupted`].
 pub fn write_split<'a>(
     parent: &Path,
     task: Task,
