@@ -147,6 +147,14 @@ impl Reader {
         &self.provenance
     }
 
+    /// Its columns without their values.
+    ///
+    /// # Errors
+    /// As [`read`].
+    pub fn no_rows(&self) -> Result<Table> {
+        of_batches(&self.path, self.stream.schema(), &[])
+    }
+
     /// The hash of the file's bytes.
     pub fn content(&self) -> ContentHash {
         self.stream.content

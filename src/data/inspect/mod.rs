@@ -2,18 +2,19 @@
 
 mod datasets;
 mod recordings;
+mod statistics;
+mod tables;
 mod text;
 
 pub use text::inspect_text;
 
 use super::dataset::{TRAIN, VALIDATION};
 use super::peek::{Format, format_of};
-use super::{Provenance, bytes, json_file, recording, table_file, weights};
+use super::{Provenance, bytes, json_file, recording, weights};
 use crate::error::{Error, Result};
 use crate::interrupt::Interrupt;
-use crate::table::{Column, Values};
 use serde_json::{Map, Value, json};
-use std::collections::BTreeSet;
+use statistics::statistics;
 use std::path::Path;
 
 /// The ending of a directory of pieces.
@@ -31,7 +32,7 @@ pub fn inspect(path: &Path, interrupt: &Interrupt) -> Result<Value> {
     }
     match format(path)? {
         Format::Mcap => recordings::one(path),
-        Format::Parquet => table(path),
+        Format::Parquet => tables::one(path),
         Format::Safetensors => network(path),
         Format::Json => summary(path),
         _ => Err(Error::input(
@@ -87,59 +88,6 @@ fn answer(kind: &str, provenance: &Provenance, rest: Value) -> Value {
     let mut fields = Map::from_iter([("kind".to_string(), json!(kind)), ("provenance".to_string(), json!(provenance))]);
     if let Value::Object(rest) = rest {
         fields.extend(rest);
-    }
-    Value::Object(fields)
-}
-
-/// Count, range, mean and standard deviation (ddof 0) of the finite values; `not_finite` appears when some are not.
-fn statistics(values: impl Iterator<Item = f64>) -> Map<String, Value> {
-    let (mut finite, mut others) = (Vec::new(), 0);
-    for value in values {
-        if value.is_finite() { finite.push(value) } else { others += 1 }
-    }
-    let n = finite.len() as f64;
-    let mean = finite.iter().sum::<f64>() / n;
-    let std = (finite.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / n).sqrt();
-    let mut fields = Map::new();
-    if !finite.is_empty() {
-        let min = finite.iter().copied().fold(f64::INFINITY, f64::min);
-        let max = finite.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-        fields.extend([("min", min), ("max", max), ("mean", mean), ("std", std)].map(|(k, v)| (k.to_string(), json!(v))));
-    }
-    if others > 0 {
-        fields.insert("not_finite".into(), json!(others));
-    }
-    fields
-}
-
-/// Statistics of each entry of row-major rows.
-fn by_entry(names: &[String], rows: &[f32]) -> Vec<Value> {
-    let column = |i: usize| rows.iter().skip(i).step_by(names.len()).map(|v| f64::from(*v));
-    let entry = |(i, name): (usize, &String)| {
-        let mut fields = statistics(column(i));
-        fields.insert("name".into(), json!(name));
-        Value::Object(fields)
-    };
-    names.iter().enumerate().map(entry).collect()
-}
-
-fn table(path: &Path) -> Result<Value> {
-    let (table, provenance) = table_file::read(path)?;
-    let columns: Vec<Value> = table.columns.iter().map(described_column).collect();
-    Ok(answer("table", &provenance, json!({ "rows": table.rows(), "columns": columns })))
-}
-
-fn described_column(column: &Column) -> Value {
-    let (kind, mut fields) = match &column.values {
-        Values::F32(v) => ("f32", statistics(v.iter().map(|x| f64::from(*x)))),
-        Values::F64(v) => ("f64", statistics(v.iter().copied())),
-        Values::I64(v) => ("i64", statistics(v.iter().map(|x| *x as f64))),
-        Values::Bool(v) => ("bool", Map::from_iter([("true".to_string(), json!(v.iter().filter(|x| **x).count()))])),
-        Values::Text(v) => ("text", Map::from_iter([("distinct".to_string(), json!(v.iter().collect::<BTreeSet<_>>().len()))])),
-    };
-    fields.extend([("name", json!(column.name)), ("type", json!(kind)), ("doc", json!(column.doc))].map(|(k, v)| (k.into(), v)));
-    if let Some(unit) = table_file::unit_of(&column.name) {
-        fields.insert("unit".into(), json!(unit));
     }
     Value::Object(fields)
 }

@@ -1,6 +1,7 @@
 //! One recording, and a directory of them.
 
-use super::{Provenance, answer, by_entry, recording, statistics};
+use super::statistics::{by_entry, statistics};
+use super::{Provenance, answer, recording};
 use crate::data::ContentHash;
 use crate::demo::{Episode, Phase, Step};
 use crate::error::{Error, Result};
