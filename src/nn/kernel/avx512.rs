@@ -5,7 +5,7 @@
 use super::super::lanes::Lanes;
 use super::Product;
 use super::tiles::{Tile, tiles};
-use super::vector::{Arithmetic, Isa, Panels};
+use super::vector::{Arithmetic, Isa, Register};
 use std::arch::x86_64::*;
 use std::cell::RefCell;
 
@@ -56,7 +56,7 @@ impl Arithmetic for Pair {
     }
 }
 
-impl Panels for Pair {
+impl Register for Pair {
     const COUNT: usize = 2;
     #[inline(always)]
     unsafe fn load_samples(from: *const Lanes) -> Self {

@@ -2,7 +2,7 @@
 
 use super::super::lanes::{LANES, Lanes};
 use super::entries::{tanh, tanh_slope};
-use super::vector::{Isa, Panels, Vector};
+use super::vector::{Isa, Register, Vector};
 use super::{Coefficients, Finish, Product, Start};
 
 /// The addresses of one register tile.
@@ -153,7 +153,7 @@ impl Tile {
 /// # Safety
 /// Every address lies within its array, and the processor has V's instructions.
 #[inline(always)]
-pub unsafe fn tiles<V: Panels, const S: usize, const P: usize, const F: usize>(count: usize, first: Tile) {
+pub unsafe fn tiles<V: Register, const S: usize, const P: usize, const F: usize>(count: usize, first: Tile) {
     let mut tile = first;
     for _ in 0..count {
         // SAFETY: the caller's.
@@ -170,7 +170,7 @@ pub unsafe fn tiles<V: Panels, const S: usize, const P: usize, const F: usize>(c
 }
 
 #[inline(always)]
-unsafe fn sums<V: Panels, const S: usize, const P: usize, const F: usize>(tile: &Tile) -> [[V; P]; F] {
+unsafe fn sums<V: Register, const S: usize, const P: usize, const F: usize>(tile: &Tile) -> [[V; P]; F] {
     // SAFETY: the caller's.
     unsafe {
         let mut sums = [[V::splat(0.0); P]; F];
@@ -189,7 +189,7 @@ unsafe fn sums<V: Panels, const S: usize, const P: usize, const F: usize>(tile: 
 
 /// Adds one k to the sums: its coefficients begin at `a`, its samples at `x`.
 #[inline(always)]
-unsafe fn step<V: Panels, const S: usize, const P: usize, const F: usize>(
+unsafe fn step<V: Register, const S: usize, const P: usize, const F: usize>(
     sums: &mut [[V; P]; F],
     a: *const f32,
     x: *const Lanes,
@@ -227,7 +227,7 @@ macro_rules! each {
 
 /// What the sums begin with and what is made of them, asked once a tile: asked once a sum it takes a hundred cycles.
 #[inline(always)]
-unsafe fn finish<V: Panels, const P: usize, const F: usize>(tile: &Tile, mut sums: [[V; P]; F]) {
+unsafe fn finish<V: Register, const P: usize, const F: usize>(tile: &Tile, mut sums: [[V; P]; F]) {
     let (width, last) = (tile.width, if tile.odd { 0 } else { tile.width });
     let place = |f: usize, p: usize| p * V::COUNT * width + f;
     let between = |p: usize| if p + 1 < P { width } else { last };

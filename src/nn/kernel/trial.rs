@@ -21,12 +21,21 @@ pub fn fastest() -> Path {
         // next is narrower
         if next.1 * GAIN > best.1 { next } else { best }
     };
-    rates().into_iter().reduce(better).map_or(Path::Portable, |(path, _)| path)
+    let mut candidates = candidates();
+    match (candidates.next(), candidates.next()) {
+        (Some(_), Some(_)) => rates().into_iter().reduce(better).map_or(Path::Portable, |(path, _)| path),
+        (only, _) => only.unwrap_or(Path::Portable),
+    }
 }
 
-/// Operations per second of each path but the portable one, which is the slowest wherever there is another, the widest first.
+/// Every path but the portable one, which is the slowest wherever there is another, the widest first.
+fn candidates() -> impl Iterator<Item = Path> {
+    Path::available().filter(|path| *path != Path::Portable)
+}
+
+/// Operations per second of each candidate.
 pub fn rates() -> Vec<(Path, f64)> {
-    let paths: Vec<Path> = Path::available().filter(|path| *path != Path::Portable).collect();
+    let paths: Vec<Path> = candidates().collect();
     let (x, matrix) = (vec![Lanes::splat(0.5); PANELS * WIDTH], vec![0.25; WIDTH * WIDTH]);
     let mut result = vec![Lanes::default(); PANELS * WIDTH];
     let mut fastest = vec![Duration::MAX; paths.len()];

@@ -47,7 +47,7 @@ pub trait Vector: Arithmetic {
 ///
 /// # Safety
 /// As [`Arithmetic`].
-pub trait Panels: Arithmetic {
+pub trait Register: Arithmetic {
     /// How many panels.
     const COUNT: usize;
     /// The same entry of samples that lie as [`Isa::samples`] has them.
@@ -59,7 +59,7 @@ pub trait Panels: Arithmetic {
     unsafe fn prefetch(soon: *const Lanes);
 }
 
-impl<V: Vector> Panels for V {
+impl<V: Vector> Register for V {
     const COUNT: usize = 1;
     #[inline(always)]
     unsafe fn load_samples(from: *const Lanes) -> Self {
