@@ -1,5 +1,6 @@
 //! A batch is cut into shards whose number depends on its size alone, never on the threads: the sums come out the same bytes.
 
+use crate::nn::kernel::wide;
 use std::ops::Range;
 
 /// Most shards of a batch: two for each of two cores evens out the load, more would only make the matrices thinner.
@@ -26,7 +27,7 @@ pub fn range(rows: usize, count: usize, i: usize) -> Range<usize> {
 
 /// total += factor x part.
 pub fn add_scaled(total: &mut [f32], part: &[f32], factor: f32) {
-    total.iter_mut().zip(part).for_each(|(t, p)| *t += factor * p);
+    wide(|| total.iter_mut().zip(part).for_each(|(t, p)| *t += factor * p));
 }
 
 #[cfg(test)]

@@ -1,5 +1,6 @@
 //! Adam (Kingma & Ba 2015) on a flat parameter vector, gradient clipping, the cosine schedule, an average of the weights.
 
+use super::kernel::wide;
 use crate::math::{cos, pow};
 
 /// Decay of the first moment.
@@ -44,11 +45,13 @@ impl Adam {
         let rate = (learning_rate / correction(BETA_1)) as f32;
         let scale = (1.0 / correction(BETA_2)) as f32;
         let moments = self.first.iter_mut().zip(&mut self.second);
-        for ((p, g), (m, v)) in params.iter_mut().zip(gradient).zip(moments) {
-            *m = BETA_1 * *m + (1.0 - BETA_1) * g;
-            *v = BETA_2 * *v + (1.0 - BETA_2) * (g * g);
-            *p -= rate * *m / ((*v * scale).sqrt() + EPSILON);
-        }
+        wide(|| {
+            for ((p, g), (m, v)) in params.iter_mut().zip(gradient).zip(moments) {
+                *m = BETA_1 * *m + (1.0 - BETA_1) * g;
+                *v = BETA_2 * *v + (1.0 - BETA_2) * (g * g);
+                *p -= rate * *m / ((*v * scale).sqrt() + EPSILON);
+            }
+        });
     }
 }
 
@@ -57,9 +60,11 @@ pub fn global_norm(gradient: &[f32]) -> f64 {
     const SUMS: usize = 8;
     let (chunks, rest) = gradient.as_chunks::<SUMS>();
     let mut sums = [0.0f64; SUMS];
-    for chunk in chunks {
-        sums.iter_mut().zip(chunk).for_each(|(sum, g)| *sum += f64::from(*g).powi(2));
-    }
+    wide(|| {
+        for chunk in chunks {
+            sums.iter_mut().zip(chunk).for_each(|(sum, g)| *sum += f64::from(*g).powi(2));
+        }
+    });
     sums.iter_mut().zip(rest).for_each(|(sum, g)| *sum += f64::from(*g).powi(2));
     sums.iter().sum::<f64>().sqrt()
 }
@@ -69,7 +74,7 @@ pub fn clip_by_global_norm(gradient: &mut [f32], limit: f64) -> f64 {
     let norm = global_norm(gradient);
     if limit > 0.0 && norm > limit && norm.is_finite() {
         let factor = (limit / norm) as f32;
-        gradient.iter_mut().for_each(|g| *g *= factor);
+        wide(|| gradient.iter_mut().for_each(|g| *g *= factor));
     }
     norm
 }
@@ -112,7 +117,7 @@ impl Ema {
         self.updates += 1;
         let n = self.updates as f32;
         let keep = self.decay.min((1.0 + n) / (EMA_WARM_UP + n));
-        self.average.iter_mut().zip(params).for_each(|(a, p)| *a = keep * *a + (1.0 - keep) * p);
+        wide(|| self.average.iter_mut().zip(params).for_each(|(a, p)| *a = keep * *a + (1.0 - keep) * p));
     }
 
     /// The average.

@@ -2,8 +2,8 @@
 
 use super::Pass;
 use super::activation::Activation;
-use super::kernel::{Coefficients, Finish, Product, Start, product};
-use super::lanes::Lanes;
+use super::kernel::{self, Coefficients, Finish, Product, Start, product};
+use super::lanes::{LANES, Lanes};
 use super::pass::BLOCK_PANELS;
 use rand::{Rng, RngExt};
 use std::ops::{Deref, DerefMut, Range};
@@ -65,7 +65,11 @@ impl Mlp {
             let (weights, _) = self.layer_ranges(layer);
             let (inputs, outputs) = (self.widths[layer], self.widths[layer + 1]);
             let (from, to) = (&self.params[weights.clone()], &mut self.transposed[weights]);
-            for (i, row) in from.chunks_exact(outputs).enumerate() {
+            let whole = inputs / LANES * LANES; // eight rows at a time
+            for i in (0..whole).step_by(LANES) {
+                transpose_eight(&from[i * outputs..], outputs, &mut to[i..], inputs);
+            }
+            for (i, row) in from.chunks_exact(outputs).enumerate().skip(whole) {
                 row.iter().enumerate().for_each(|(o, w)| to[o * inputs + i] = *w);
             }
         }
@@ -235,6 +239,18 @@ impl Mlp {
             let (weights, biases) = self.layer_ranges(layer);
             total.sums.write(layer, &mut gradient[weights.start..biases.end], self.widths[layer + 1]);
         }
+    }
+}
+
+/// Eight rows of `outputs` numbers become the first eight of each of so many rows of `inputs` numbers.
+fn transpose_eight(from: &[f32], outputs: usize, to: &mut [f32], inputs: usize) {
+    /// Columns at a time.
+    const BLOCK: usize = 64;
+    let mut block = [Lanes::default(); BLOCK];
+    for start in (0..outputs).step_by(BLOCK) {
+        let block = &mut block[..BLOCK.min(outputs - start)];
+        kernel::interleave(block, std::array::from_fn(|r| &from[r * outputs + start..(r + 1) * outputs]));
+        block.iter().zip(start..).for_each(|(column, o)| to[o * inputs..o * inputs + LANES].copy_from_slice(&column.0));
     }
 }
 

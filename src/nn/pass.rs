@@ -1,7 +1,7 @@
 //! The workspace of forward and backward.
 
 use super::Mlp;
-use super::kernel::{Coefficients, Finish, Product, Start, product, transpose};
+use super::kernel::{Coefficients, Finish, Product, Start, product, transpose, wide};
 use super::lanes::{LANES, Lanes, Panels, panels_of, read_panel};
 
 /// Panels that had best go through forward, backward and the gradient before the next do: their activations then wait in a core's second
@@ -104,7 +104,7 @@ impl GradientSums {
             match (*fresh, *other_fresh) {
                 (_, true) => {}
                 (true, false) => sums.copy_from_slice(others),
-                (false, false) => sums.iter_mut().zip(others).for_each(|(sum, other)| *sum += *other),
+                (false, false) => wide(|| sums.iter_mut().zip(others).for_each(|(sum, other)| *sum += *other)),
             }
             *fresh &= *other_fresh;
         }

@@ -150,3 +150,12 @@ pub unsafe fn separate(rows: [&mut [f32]; LANES], panel: &[Lanes]) {
     // SAFETY: the caller's.
     unsafe { super::entries::separate::<__m256>(rows, panel) }
 }
+
+/// `work`, which the compiler takes in here and with it these instructions.
+///
+/// # Safety
+/// The processor has them.
+#[target_feature(enable = "avx2,fma")]
+pub unsafe fn wide<R>(work: impl FnOnce() -> R) -> R {
+    work()
+}

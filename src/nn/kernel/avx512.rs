@@ -171,3 +171,12 @@ pub unsafe fn product(result: &mut [Lanes], width: usize, of: &Product) {
     // SAFETY: the caller's.
     unsafe { super::tiles::product::<Avx512>(result, width, of) }
 }
+
+/// `work`, which the compiler takes in here and with it these instructions.
+///
+/// # Safety
+/// The processor has them.
+#[target_feature(enable = "avx2,fma,avx512f,avx512vl,avx512dq")]
+pub unsafe fn wide<R>(work: impl FnOnce() -> R) -> R {
+    work()
+}

@@ -108,6 +108,25 @@ fn product_on(path: Path, result: &mut [Lanes], width: usize, of: Product) {
     }
 }
 
+/// Runs a loop over many numbers, each by itself, compiled for the registers of the path that runs. Nothing is fused, so that the results
+/// have the same bits.
+pub fn wide<R>(work: impl FnOnce() -> R) -> R {
+    wide_on(Path::best(), work)
+}
+
+fn wide_on<R>(path: Path, work: impl FnOnce() -> R) -> R {
+    // SAFETY: `path` is one that this processor has.
+    unsafe {
+        match path {
+            #[cfg(target_arch = "x86_64")]
+            Path::Avx512 => avx512::wide(work),
+            #[cfg(target_arch = "x86_64")]
+            Path::Avx512Vl | Path::Avx2 => avx2::wide(work),
+            Path::Portable => work(),
+        }
+    }
+}
+
 /// y <- tanh(y), in place.
 pub fn tanh(y: &mut [Lanes]) {
     tanh_on(Path::best(), y);
