@@ -1,16 +1,16 @@
 //! Time of one update: Algorithm 1 on 1, 16 and 32 demos of 150 steps (behavior cloning, state cloning, dynamics fine-tuning; D = 32, 9
 //! actions, 3 x 100 tanh, rho .45), and behavior cloning alone on 512 pairs, on one and on two threads; beside it, the share of the
 //! processor's f32 peak, measured here by loops of fused multiplications and additions in its widest registers. Only the matrix products
-//! of the two networks count as operations: not tanh, features, losses or Adam, nor idle lanes, nor the first steps that behavior cloning
-//! has already done. Prints a table in Markdown.
+//! of the two networks count as operations: not tanh, features, losses or Adam, nor idle lanes, nor the first steps that the pass over
+//! the demos' states has already done. Prints a table in Markdown.
 
 #[allow(dead_code, reason = "the other benches use more of it")]
 mod common;
 
-use hilt::config::{PretrainSettings, TrainSettings};
+use hilt::config::{Alpha, PretrainSettings, TrainSettings};
 use hilt::demo::Demo;
 use hilt::interrupt::Interrupt;
-use hilt::learn::{Learner, pretrain_dynamics};
+use hilt::learn::{Hil, Inputs, pretrain_dynamics};
 use hilt::math::sin_cos;
 use hilt::nn::kernel;
 use hilt::robot::READY_Q_RAD;
@@ -46,20 +46,14 @@ fn demo(index: usize) -> Demo {
     Demo::new(Task::Stack, states, actions.clone(), actions).expect("lengths match")
 }
 
-fn learner() -> Learner {
+fn method() -> Hil {
     let demos: Vec<Demo> = (0..DEMOS).map(demo).collect();
     let pretrain = PretrainSettings { epochs: 1, ..Default::default() };
-    let settings = TrainSettings { rho: RHO, ..Default::default() };
+    let settings = TrainSettings { rho: RHO, batch: DEMOS, ..Default::default() };
     let (dynamics, _) =
-        pretrain_dynamics(&demos, &demos[..1], &pretrain, 0, &mut |_| {}, &Interrupt::default()).expect("the demos are sound");
-    Learner::new(&demos, &demos[..1], Some(dynamics), &settings, 0).expect("the demos are sound")
-}
-
-fn hil_update(learner: &mut Learner, demos: &[usize], rows: &[usize]) {
-    learner.behavior_cloning(rows, demos.len() as f64).expect("finite");
-    learner.state_cloning(demos, rows).expect("finite");
-    learner.update(0.5, 1.0, LEARNING_RATE);
-    learner.fine_tune(rows).expect("finite");
+        pretrain_dynamics(&demos, &demos[..1], &pretrain, 0, &mut |_, _| {}, &Interrupt::default()).expect("the demos are sound");
+    let inputs = Inputs::new(&demos, &demos[..1]).expect("the demos are sound");
+    Hil::new(inputs, Some(dynamics), Alpha::Fixed(0.5), &settings, 0).expect("the settings are sound")
 }
 
 /// Registers of the loops below: enough that no multiplication waits for the one before it.
@@ -172,22 +166,17 @@ fn main() {
 }
 
 fn updates(threads: usize, yardstick: &mut Yardstick) {
-    let mut learner = learner();
+    let mut method = method();
     for size in [1, 16, 32] {
         let demos: Vec<usize> = (0..size).collect();
-        let mut rows = Vec::new();
-        learner.rows_of(&demos, &mut rows);
         yardstick.report(&format!("HIL, {size} demos"), threads, || {
-            hil_update(&mut learner, &demos, &rows);
-            // the segments, drawn anew every time, decide how many first steps behavior cloning has already done
-            learner.flops_per_update(rows.len() as u64, learner.segments().len() as u64)
+            method.update(&demos, LEARNING_RATE, None).expect("finite");
+            method.flops_per_update((size * STEPS) as u64)
         });
     }
     let rows: Vec<usize> = (0..512).map(|i| i * 7 % (DEMOS * STEPS)).collect();
-    let demos = rows.len() as f64 / STEPS as f64;
     yardstick.report("BC, 512 pairs", threads, || {
-        learner.behavior_cloning(&rows, demos).expect("finite");
-        learner.update(0.0, 1.0, LEARNING_RATE);
-        learner.bc_flops_per_update(rows.len() as u64)
+        method.clone_behavior(&rows, LEARNING_RATE).expect("finite");
+        method.bc_flops_per_update(rows.len() as u64)
     });
 }

@@ -12,7 +12,11 @@ pub const FINGERS: usize = 3;
 /// All driven joints: arm, then fingers.
 pub const JOINTS: usize = ARM_JOINTS + FINGERS;
 /// Entries of the state that every task has: q (9), dq (9), block pose (7).
-pub const BASE_DIM: usize = 2 * JOINTS + 7;
+pub const BASE_DIM: usize = 2 * JOINTS + POSE_DIM;
+/// Most entries that a task appends: the pose of stack's base block.
+pub const MOST_CONTEXT: usize = POSE_DIM;
+/// Entries of a pose: x y z, qx qy qz qw.
+const POSE_DIM: usize = 7;
 /// Control rate \[Hz\].
 pub const CONTROL_HZ: u32 = 20;
 /// Duration of a control step \[s\].

@@ -1,9 +1,9 @@
 //! Training allocates nothing in its loop: after two updates, updates on other demos and segments find all the room that they need.
 
-use hilt::config::{ActionChoice, PretrainSettings, TrainSettings};
+use hilt::config::{ActionChoice, Alpha, PretrainSettings, TrainSettings};
 use hilt::demo::Demo;
 use hilt::interrupt::Interrupt;
-use hilt::learn::{Learner, pretrain_dynamics};
+use hilt::learn::{Hil, Inputs, pretrain_dynamics};
 use hilt::tasks::Task;
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
@@ -64,13 +64,9 @@ fn demo(index: usize) -> Demo {
 }
 
 /// One update of Algorithm 1 on four demos that depend on `i`.
-fn update(learner: &mut Learner, i: usize, rows: &mut Vec<usize>) {
+fn update(hil: &mut Hil, i: usize) {
     let demos: [usize; BATCH] = std::array::from_fn(|k| (5 * i + 3 * k) % DEMOS);
-    learner.rows_of(&demos, rows);
-    learner.behavior_cloning(rows, BATCH as f64).expect("finite");
-    learner.state_cloning(&demos, rows).expect("finite");
-    learner.update(0.5, 1.0, 1e-5);
-    learner.fine_tune(rows).expect("finite");
+    hil.update(&demos, 1e-5, None).expect("finite");
 }
 
 #[test]
@@ -78,16 +74,16 @@ fn updates_allocate_nothing() {
     let demos: Vec<Demo> = (0..DEMOS).map(demo).collect();
     let go = Interrupt::default();
     let pretrain = PretrainSettings { epochs: 1, ..Default::default() };
-    let (dynamics, _) = pretrain_dynamics(&demos, &demos[..1], &pretrain, 0, &mut |_| {}, &go).expect("the demos are sound");
+    let (dynamics, _) = pretrain_dynamics(&demos, &demos[..1], &pretrain, 0, &mut |_, _| {}, &go).expect("the demos are sound");
     let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("a thread starts");
     for action in [ActionChoice::Mean, ActionChoice::Sample] {
         let settings = TrainSettings { batch: BATCH, bc_batch: 128, rho: 0.3, action, ..Default::default() };
-        let mut learner = Learner::new(&demos, &demos[..1], Some(dynamics.clone()), &settings, 0).expect("the demos are sound");
+        let inputs = Inputs::new(&demos, &demos[..1]).expect("the demos are sound");
+        let mut hil = Hil::new(inputs, Some(dynamics.clone()), Alpha::Fixed(0.5), &settings, 0).expect("the settings are sound");
         pool.install(|| {
-            let mut rows = Vec::new();
             // the test can fail: the first updates make room
-            assert!(allocations(|| (0..2).for_each(|i| update(&mut learner, i, &mut rows))) > 0);
-            assert_eq!(allocations(|| (2..22).for_each(|i| update(&mut learner, i, &mut rows))), 0, "{action:?}");
+            assert!(allocations(|| (0..2).for_each(|i| update(&mut hil, i))) > 0);
+            assert_eq!(allocations(|| (2..22).for_each(|i| update(&mut hil, i))), 0, "{action:?}");
         });
     }
 }

@@ -5,7 +5,7 @@ use hilt::data::dataset::{self, DatasetEpisode};
 use hilt::data::{Provenance, recording, table_file, weights};
 use hilt::demo::Demo;
 use hilt::interrupt::Interrupt;
-use hilt::learn::{Checkpoint, Dynamics, Hooks, Method, pretrain_dynamics, train};
+use hilt::learn::{Checkpoint, Dynamics, Hooks, Inputs, MethodName, pretrain_dynamics, train};
 use hilt::plan::{Plan, from_table, to_table};
 use hilt::state::JOINTS;
 use serde_json::json;
@@ -67,9 +67,9 @@ pub fn dataset(root: &Path) {
 
 /// A dynamics network of a few units.
 pub fn dynamics() -> Dynamics {
-    let settings = PretrainSettings { hidden_units: 4, hidden_layers: 1, epochs: 1, ensemble: 2, ..Default::default() };
+    let settings = PretrainSettings { hidden_units: 4, hidden_layers: 1, epochs: 1, ..Default::default() };
     let demos = [demo()];
-    pretrain_dynamics(&demos, &demos, &settings, 0, &mut |_| {}, &Interrupt::default()).expect("pretrains").0
+    pretrain_dynamics(&demos, &demos, &settings, 0, &mut |_, _| {}, &Interrupt::default()).expect("pretrains").0
 }
 
 /// Settings of a training of a moment.
@@ -92,7 +92,7 @@ pub fn training(dynamics: &Dynamics, resume: Option<Checkpoint>, interrupt: &Int
     let keep = Box::new(|checkpoint: &Checkpoint| kept.push(checkpoint.clone()));
     let keep_every = Some(Duration::ZERO);
     let hooks = Hooks { keep, keep_every, resume, score: Box::new(|_| Ok(1)), ..Hooks::new(interrupt) };
-    train(Method::Hil, &demos, &demos, Some(dynamics.clone()), &settings(), 0, hooks)?;
+    train(MethodName::Hil, Inputs::new(&demos, &demos)?, Some(dynamics.clone()), &settings(), 0, hooks)?;
     Ok(kept)
 }
 

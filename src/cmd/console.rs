@@ -68,13 +68,22 @@ impl Console {
     }
 
     /// Begins to count `total` items of work, called `unit` ("plans").
-    pub fn progress(&self, stage: &'static str, total: u64, unit: &'static str) -> Progress<'_> {
+    pub fn progress(&self, stage: &str, total: u64, unit: &'static str) -> Progress<'_> {
         let bar = (!self.bars.is_hidden()).then(|| {
             let style = ProgressStyle::with_template("{prefix} {wide_bar} {pos}/{len} {msg} {per_sec} eta {eta}")
                 .expect("the template of the bar is well formed");
-            self.bars.add(ProgressBar::new(total).with_style(style).with_prefix(stage).with_message(unit))
+            self.bars.add(ProgressBar::new(total).with_style(style).with_prefix(stage.to_string()).with_message(unit))
         });
-        Progress { console: self, stage, unit, total, bar, before: 0, done: AtomicU64::new(0), started: Instant::now() }
+        Progress {
+            console: self,
+            stage: stage.into(),
+            unit,
+            total,
+            bar,
+            before: 0,
+            done: AtomicU64::new(0),
+            started: Instant::now(),
+        }
     }
 }
 
@@ -91,7 +100,7 @@ fn open(path: &Path, goes_on: bool) -> Result<File> {
 #[derive(Debug)]
 pub struct Progress<'a> {
     console: &'a Console,
-    stage: &'static str,
+    stage: String,
     unit: &'static str,
     total: u64,
     bar: Option<ProgressBar>,

@@ -1,13 +1,13 @@
 //! The progress of learning: one count per part (pretraining, warm start, Algorithm 1), with the losses as they stand.
 
 use super::{Console, Progress};
-use crate::learn::EpochMetrics;
+use crate::learn::{EpochMetrics, Metric};
 use std::time::Instant;
 
 /// Follows the epochs of one stage.
 pub struct Epochs<'a> {
     console: &'a Console,
-    running: Option<(&'static str, Progress<'a>)>,
+    running: Option<(String, Progress<'a>)>,
     /// When the running part began: its first report comes after its first epoch.
     began: Instant,
 }
@@ -19,14 +19,14 @@ impl<'a> Epochs<'a> {
     }
 
     /// One more epoch is done.
-    pub fn step(&mut self, epoch: &EpochMetrics) {
+    pub fn step(&mut self, epoch: &EpochMetrics, metrics: &[Metric]) {
         if self.running.as_ref().is_none_or(|(part, _)| *part != epoch.stage) {
             self.finish();
-            let progress = self.console.progress(epoch.stage, epoch.epochs, "epochs").since(self.began);
-            self.running = Some((epoch.stage, progress.after(epoch.epoch - 1)));
+            let progress = self.console.progress(&epoch.stage, epoch.epochs, "epochs").since(self.began);
+            self.running = Some((epoch.stage.clone(), progress.after(epoch.epoch - 1)));
         }
         if let Some((_, progress)) = &self.running {
-            progress.step_with(&words(epoch));
+            progress.step_with(&words(epoch, metrics));
         }
     }
 
@@ -40,16 +40,7 @@ impl<'a> Epochs<'a> {
 }
 
 /// What is known of the epoch, in words; what was not computed is left out.
-fn words(epoch: &EpochMetrics) -> String {
-    let values = [
-        ("l_bc", epoch.l_bc),
-        ("l_sc", epoch.l_sc),
-        ("d_conv", epoch.d_conv),
-        ("alpha", epoch.alpha),
-        ("l_model", epoch.l_model),
-        ("validation l_bc", epoch.validation_l_bc),
-        ("validation l_model", epoch.validation_l_model),
-    ];
-    let known = values.iter().filter(|(_, value)| value.is_finite());
-    known.map(|(name, value)| format!(", {name} {value:.4}")).collect()
+fn words(epoch: &EpochMetrics, metrics: &[Metric]) -> String {
+    let labelled = metrics.iter().filter_map(|metric| metric.label.map(|label| (label, epoch.get(metric.name))));
+    labelled.filter(|(_, value)| value.is_finite()).map(|(label, value)| format!(", {label} {value:.4}")).collect()
 }

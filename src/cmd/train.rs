@@ -8,7 +8,7 @@ use crate::data::{ContentHash, atomic, table_file, weights};
 use crate::error::{Error, Result};
 use crate::eval::{PolicyController, Rollouts};
 use crate::interrupt::Interrupt;
-use crate::learn::{Checkpoint, Dynamics, Hooks, Method, Policy, Selection, train};
+use crate::learn::{Checkpoint, Dynamics, Hooks, Inputs, MethodName, Policy, Selection, train};
 use crate::scene::Scene;
 use crate::sim::Controller;
 use crate::tasks::Task;
@@ -28,7 +28,7 @@ pub struct Args {
     settings: SettingsArgs,
     /// Method: hil, bc or sc
     #[arg(long, value_name = "METHOD", default_value = "hil", value_parser = method)]
-    method: Method,
+    method: MethodName,
     /// State recovery probability, 0 to 1 [default: train.rho]
     #[arg(long, value_name = "RHO", allow_negative_numbers = true)]
     rho: Option<f64>,
@@ -60,12 +60,12 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome> {
         args.settings.resolve(&[("train.rho", args.rho.map(|v| v.to_string())), ("train.alpha", args.alpha.clone())])?;
     let dir = path_or(args.dataset.as_deref(), pipeline.task, "dataset");
     let model = path_or(args.dynamics.as_deref(), pipeline.task, "dynamics.safetensors");
-    let method = format!("{:?}", args.method).to_lowercase();
+    let method = args.method.name();
     // As `make all METHOD=bc` has it: another method replaces no policy of hil.
-    let name = if args.method == Method::Hil { "policy.safetensors".into() } else { format!("policy-{method}.safetensors") };
+    let name = if args.method == MethodName::Hil { "policy.safetensors".into() } else { format!("policy-{method}.safetensors") };
     let out = path_or(args.out.as_deref(), pipeline.task, &name);
     let metrics = args.metrics.clone().unwrap_or_else(|| beside(&out, "training.parquet"));
-    let needs_model = args.method != Method::Bc || args.dynamics.is_some();
+    let needs_model = args.method.needs_dynamics() || args.dynamics.is_some();
     let kept = beside(&out, checkpoint::ENDING);
     let places = args.settings.places().read(&dir).read_all(needs_model.then_some(model.as_path()));
     let places =
@@ -84,14 +84,14 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome> {
     let mut keeper = Keeper::new(&kept, &provenance, console, resume.as_ref());
     let mut epochs = Epochs::new(console);
     let hooks = Hooks {
-        log: Box::new(|epoch| epochs.step(epoch)),
+        log: Box::new(|epoch, metrics| epochs.step(epoch, metrics)),
         score: Box::new(|policy| successes(&pipeline, seed, policy, &context.interrupt)),
         keep: Box::new(|checkpoint| keeper.keep(checkpoint)),
         keep_every: (args.checkpoint_every > 0).then(|| Duration::from_secs(args.checkpoint_every)),
         resume,
         interrupt: &context.interrupt,
     };
-    let trained = train(args.method, demos, validation, dynamics, &pipeline.train, seed, hooks);
+    let trained = train(args.method, Inputs::new(demos, validation)?, dynamics, &pipeline.train, seed, hooks);
     let trained = trained.map_err(|why| keeper.explain(why))?;
     epochs.finish();
     let mut meta = trained.policy.meta();
@@ -141,14 +141,10 @@ fn read_dynamics(path: &Path, task: Task) -> Result<(Dynamics, ContentHash)> {
     Ok((Dynamics::from_tensors(&tensors, &meta).map_err(|why| Error::input(path, why))?, content))
 }
 
-fn method(name: &str) -> std::result::Result<Method, String> {
-    match name {
-        "hil" => Ok(Method::Hil),
-        "bc" => Ok(Method::Bc),
-        "sc" => Ok(Method::Sc),
-        _ => {
-            let hint = did_you_mean(name, ["hil", "bc", "sc"]);
-            Err(format!("unknown method \"{name}\"{hint}; allowed: hil (both losses), bc (behavior cloning), sc (state cloning)"))
-        }
-    }
+fn method(name: &str) -> std::result::Result<MethodName, String> {
+    let names = MethodName::ALL.map(MethodName::name);
+    MethodName::ALL.into_iter().find(|method| method.name() == name).ok_or_else(|| {
+        let hint = did_you_mean(name, names);
+        format!("unknown method \"{name}\"{hint}; allowed: hil (both losses), bc (behavior cloning), sc (state cloning)")
+    })
 }

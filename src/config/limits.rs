@@ -24,14 +24,11 @@ pub(super) fn within_ranges(section: &str, settings: &impl Serialize) -> Result<
 const MOST_WEIGHTS: usize = 5_000_000;
 
 /// The hidden layers of `count` networks; inputs and outputs add little.
-pub(super) fn network(stage: &str, layers: usize, units: usize, count: usize) -> Result<()> {
-    let weights = (layers - 1) * units * units * count;
+pub(super) fn network(stage: &str, layers: usize, units: usize) -> Result<()> {
+    let weights = (layers - 1) * units * units;
     if weights <= MOST_WEIGHTS {
         return Ok(());
     }
     let key = format!("{stage}.hidden_layers = {layers} with {stage}.hidden_units = {units}");
-    let networks = if count > 1 { format!(" in {count} networks") } else { String::new() };
-    Err(Error::Usage(format!(
-        "{key}{networks} is not allowed: {weights} weights between hidden layers, {MOST_WEIGHTS} are the most"
-    )))
+    Err(Error::Usage(format!("{key} is not allowed: {weights} weights between hidden layers, {MOST_WEIGHTS} are the most")))
 }

@@ -1,8 +1,7 @@
 //! Settings of the dynamics network. Defaults are the preset `best`.
 
 use super::choices::{FeatureSet, ModelLoss, Structure};
-use super::limits::{network, refuse, within_ranges};
-use super::ranges::MOST_EPOCHS;
+use super::limits::{network, within_ranges};
 use super::scene::PulseSettings;
 use crate::error::Result;
 use crate::nn::Activation;
@@ -24,10 +23,6 @@ pub struct PretrainSettings {
     pub structure: Structure,
     /// The loss of Eq. 6.
     pub loss: ModelLoss,
-    /// Steps that the network runs on its own predictions in the loss; 1 = Eq. 6, on observed states only.
-    pub steps: usize,
-    /// Networks that learn the same from other beginnings; the rollouts of state cloning pass through one after another, an update each.
-    pub ensemble: usize,
     /// K: how often each demo's commands are executed again in the simulator, under new noise and the pulses below (Algorithm 4 executes
     /// them). The dynamics network learns from them; the policy never sees them.
     pub reexecute: u64,
@@ -61,8 +56,6 @@ impl Default for PretrainSettings {
             features: FeatureSet::Fk,
             structure: Structure::Kinematic,
             loss: ModelLoss::StandardisedHuber,
-            steps: 1,
-            ensemble: 1,
             reexecute: 0,
             reexecute_pulses: PulseSettings { probability: 0.01, ..PulseSettings::default() },
             epochs: 200,
@@ -84,11 +77,7 @@ impl PretrainSettings {
     /// [`crate::error::Error::Usage`] names the key, its value and what is allowed.
     pub fn validate(&self) -> Result<()> {
         within_ranges("pretrain", self)?;
-        network("pretrain", self.hidden_layers, self.hidden_units, self.ensemble)?;
-        let (epochs, networks) = (self.epochs, self.ensemble as u64);
-        if (epochs * networks) as f64 > MOST_EPOCHS {
-            return refuse("pretrain.epochs", epochs, &format!("at most {MOST_EPOCHS} over all {networks} networks"));
-        }
+        network("pretrain", self.hidden_layers, self.hidden_units)?;
         Ok(())
     }
 }
@@ -103,8 +92,7 @@ mod tests {
         let base = PretrainSettings::default;
         assert!(base().validate().is_ok());
         let cases = [
-            (PretrainSettings { steps: 0, ..base() }, "pretrain.steps = 0 is not allowed; it must be from 1 to 100"),
-            (PretrainSettings { ensemble: 101, ..base() }, "pretrain.ensemble = 101 is not allowed; it must be from 1 to 100"),
+            (PretrainSettings { epochs: 0, ..base() }, "pretrain.epochs = 0 is not allowed; it must be from 1 to"),
             (
                 PretrainSettings { reexecute: 1001, ..base() },
                 "pretrain.reexecute = 1001 is not allowed; it must be from 0 to 1000",

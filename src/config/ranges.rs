@@ -83,8 +83,6 @@ pub(super) const RANGES: &[Range] = &[
     within("evaluate.horizon_steps", 0.0, STEPS),
     within("pretrain.hidden_layers", 1.0, MOST_LAYERS as f64),
     within("pretrain.hidden_units", 1.0, MOST_UNITS as f64),
-    within("pretrain.steps", 1.0, 100.0),
-    within("pretrain.ensemble", 1.0, 100.0),
     within("pretrain.reexecute", 0.0, 1000.0),
     within("pretrain.reexecute_pulses.probability", 0.0, 1.0),
     within("pretrain.reexecute_pulses.steps", 1.0, STEPS),

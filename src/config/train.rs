@@ -145,7 +145,7 @@ impl TrainSettings {
     /// [`Error::Usage`] names the key, its value and what is allowed.
     pub fn validate(&self) -> Result<()> {
         within_ranges("train", self)?;
-        network("train", self.hidden_layers, self.hidden_units, 1)?;
+        network("train", self.hidden_layers, self.hidden_units)?;
         if self.epochs == 0 && self.warm_start_updates == 0 {
             return Err(Error::Usage("train.epochs and train.warm_start_updates are both 0: there is nothing to do".into()));
         }

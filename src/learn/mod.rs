@@ -1,51 +1,18 @@
-//! The paper's method: hybrid imitation learning and its parts, one file an algorithm.
+//! Learning: the paper's networks, its losses, and the methods that descend them.
+//!
+//! - [`models`]: pi_theta and f_phi, what they see, the demos side by side
+//! - [`losses`]: L_BC (Algorithm 2), L_SC (Algorithm 3), L_model (Eq. 6), each with its gradient
+//! - [`run`](mod@run): the loop around any method: epochs, checkpoints, metrics, selection
+//! - [`methods`]: Algorithm 1 (HIL, with BC and SC as its ends) and Algorithm 4 (pretraining of f_phi)
 
-pub mod behavior_cloning;
-mod checkpoint;
-mod corpus;
-mod cost;
-mod dynamics;
-mod exact;
-mod features;
-mod fine_tuning;
-#[cfg(test)]
-mod gradient_tests;
-mod hand;
-pub mod hil;
-mod learner;
 mod limits;
-mod metrics;
-mod model_report;
-mod multi_step;
-mod past;
-mod patience;
-mod policy;
-pub mod pretrain_dynamics;
-mod pushes;
-mod regression;
+pub mod losses;
+pub mod methods;
+pub mod models;
+pub mod run;
 #[cfg(test)]
-mod resume_tests;
-mod rollout;
-mod run;
-mod samples;
-mod scaling;
-mod selection;
-mod shards;
-pub mod state_cloning;
-#[cfg(test)]
-mod testing;
-#[cfg(test)]
-mod training_tests;
-mod weights;
+mod tests;
 
-pub use checkpoint::Checkpoint;
-pub use dynamics::Dynamics;
-pub use features::Features;
-pub use hil::{Method, Trained, train};
-pub use learner::Learner;
-pub use metrics::EpochMetrics;
-pub use model_report::ModelReport;
-pub use policy::Policy;
-pub use pretrain_dynamics::pretrain_dynamics;
-pub use run::{Hooks, Score};
-pub use selection::{Candidate, Selection};
+pub use methods::{Hil, Inputs, MethodName, pretrain_dynamics, train};
+pub use models::{Dynamics, ModelReport, Policy};
+pub use run::{Checkpoint, EpochMetrics, Hooks, Method, Metric, Selection, Trained};

@@ -1,8 +1,8 @@
 //! The workspace of forward and backward.
 
-use super::Mlp;
 use super::kernel::{Coefficients, Finish, Product, Start, product, transpose, wide};
-use super::lanes::{LANES, Lanes, Panels, panels_of, read_panel};
+use super::lanes::{LANES, Lanes, panels_of};
+use super::panels::{Panels, read_panel};
 
 /// Panels that had best go through forward, backward and the gradient before the next do: their activations then wait in a core's second
 /// cache (200 to 400 kB for a network of three times 100), and the sums of the gradient still stay in registers for long.
@@ -15,51 +15,13 @@ pub struct Pass {
     pub input: Panels,
     /// Outputs, widths\[last\] entries.
     pub output: Panels,
-    /// Gradient of the loss with respect to the outputs, to be set before [`Mlp::backward`].
+    /// Gradient of the loss with respect to the outputs, to be set before [`super::Mlp::backward`].
     pub d_output: Panels,
-    /// Gradient with respect to the inputs, set by [`Mlp::backward_input`].
+    /// Gradient with respect to the inputs, set by [`super::Mlp::backward_input`].
     pub d_input: Panels,
     pub(super) hidden: Vec<Panels>,
     pub(super) d_hidden: Vec<Panels>,
     pub(super) sums: GradientSums,
-}
-
-impl Pass {
-    /// A workspace for `panels` panels of `mlp`.
-    pub fn new(mlp: &Mlp, panels: usize) -> Self {
-        let mut pass = Pass::default();
-        pass.reserve(mlp, panels);
-        pass
-    }
-
-    /// Sees to it that [`Pass::reserve`] for at most `panels` panels does not allocate, nor the gradient.
-    pub fn provide(&mut self, mlp: &Mlp, panels: usize) {
-        self.reserve(mlp, 0);
-        for (i, width) in mlp.widths()[1..mlp.layers()].iter().enumerate() {
-            self.hidden[i].provide(*width, panels);
-            self.d_hidden[i].provide(*width, panels);
-        }
-        self.input.provide(mlp.inputs(), panels);
-        self.d_input.provide(mlp.inputs(), panels);
-        self.output.provide(mlp.outputs(), panels);
-        self.d_output.provide(mlp.outputs(), panels);
-        self.sums.begin(mlp.widths());
-    }
-
-    /// Makes room for `panels` panels; keeps what is there and never shrinks.
-    pub fn reserve(&mut self, mlp: &Mlp, panels: usize) {
-        let hidden = &mlp.widths()[1..mlp.layers()];
-        self.hidden.resize_with(hidden.len(), Panels::default);
-        self.d_hidden.resize_with(hidden.len(), Panels::default);
-        for (i, width) in hidden.iter().enumerate() {
-            self.hidden[i].reserve(*width, panels);
-            self.d_hidden[i].reserve(*width, panels);
-        }
-        self.input.reserve(mlp.inputs(), panels);
-        self.d_input.reserve(mlp.inputs(), panels);
-        self.output.reserve(mlp.outputs(), panels);
-        self.d_output.reserve(mlp.outputs(), panels);
-    }
 }
 
 /// A network's gradient while it is summed. Per layer, lanes run over the inputs, so that x^T dy is a product like the others; a bias is

@@ -7,7 +7,7 @@ use std::process::Command;
 const MEMORY_KB: u64 = 3_000_000;
 
 /// Each of these takes most of what its range allows: time, steps, weights or rows.
-const ENDS: [(&str, &str, &str); 28] = [
+const ENDS: [(&str, &str, &str); 26] = [
     ("plan", "plan.speed=1e-5", "simulate.max_steps can allow"),
     ("plan", "plan.speed=1e-300", "simulate.max_steps can allow"),
     ("plan", "plan.max_acceleration_rad_s2=1e-300", "simulate.max_steps can allow"),
@@ -19,8 +19,6 @@ const ENDS: [(&str, &str, &str); 28] = [
     ("simulate", "simulate.noise_variance=1", ""),
     ("simulate", "simulate.pulses={probability=1.0, steps=10000, sigma_rad_s=10.0}", ""),
     ("convert", "convert.demos=100000", ""),
-    ("pretrain", "pretrain.steps=100", ""),
-    ("pretrain", "pretrain.ensemble=100", ""),
     ("pretrain", "pretrain.hidden_layers=16", ""),
     ("pretrain", "pretrain.hidden_units=1024", ""),
     ("pretrain", "pretrain.batch_rows=1000000", ""),

@@ -1,9 +1,9 @@
 //! The compilation for AVX2 with FMA. Every function here needs a processor that has both.
 
-use super::super::lanes::{LANES, Lanes};
-use super::Product;
-use super::tiles::Tile;
+use super::operation::Product;
+use super::tile::Tile;
 use super::vector::{Arithmetic, Isa, Vector};
+use crate::nn::lanes::{LANES, Lanes};
 use std::arch::x86_64::*;
 
 impl Arithmetic for __m256 {

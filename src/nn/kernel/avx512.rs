@@ -2,10 +2,11 @@
 //! are written, so that samples lie in memory as for every other path. The sums are the same to the bit. A panel that has no neighbour is
 //! joined with itself.
 
-use super::super::lanes::Lanes;
-use super::Product;
-use super::tiles::{Tile, tiles};
+use super::operation::Product;
+use super::tile::Tile;
+use super::tiles::tiles;
 use super::vector::{Arithmetic, Isa, Register};
+use crate::nn::lanes::Lanes;
 use std::arch::x86_64::*;
 use std::cell::RefCell;
 

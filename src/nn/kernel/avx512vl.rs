@@ -1,10 +1,10 @@
 //! Products compiled for AVX-512 with its instructions for shorter vectors (VL): eight floats as with AVX2, but 32 registers for them, so
 //! that a tile is twice as large and reads its operands half as often. The sums are the same to the bit.
 
-use super::super::lanes::Lanes;
-use super::Product;
-use super::tiles::Tile;
+use super::operation::Product;
+use super::tile::Tile;
 use super::vector::Isa;
+use crate::nn::lanes::Lanes;
 use std::arch::x86_64::__m256;
 
 /// AVX-512VL: 24 of 32 registers hold sums.

@@ -1,7 +1,7 @@
 //! tanh, and samples turned into lanes.
 
-use super::super::lanes::{LANES, Lanes};
 use super::vector::{Arithmetic, Vector};
+use crate::nn::lanes::{LANES, Lanes};
 
 /// Where [`NUMERATOR`] and [`DENOMINATOR`] end: tanh is 1 there but for 2e-7.
 const SATURATED: f32 = 8.0;

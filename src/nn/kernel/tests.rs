@@ -1,5 +1,6 @@
 //! The kernels of every path against plain loops.
 
+use super::path::Path;
 use super::tiles::{runs, spans};
 use super::*;
 use std::cmp::Ordering;
@@ -31,7 +32,7 @@ fn products_equal_plain_loops() {
                 let check = |a: Coefficients, start: Start, at: &dyn Fn(usize, usize) -> f32| {
                     let mut result = before.clone();
                     let of = Product { x: &x, depth, a, start, finish: Finish::Nothing };
-                    product_on(path, &mut result, width, of);
+                    on::product(path, &mut result, width, of);
                     for (i, l) in (0..panels * width).flat_map(|i| (0..LANES).map(move |l| (i, l))) {
                         let (p, f) = (i / width, i % width);
                         let first = match start {
@@ -74,10 +75,10 @@ fn all_paths_give_the_same_bits() {
         let matrix: Vec<f32> = fine(depth * width / LANES, 40).iter().flat_map(|lanes| lanes.0).collect();
         let run = |path: Path, a: Coefficients, finish: Finish| {
             let mut result = lanes(panels * width, 2);
-            product_on(path, &mut result, width, Product { x: &x, depth, a, start: Start::Result, finish });
+            on::product(path, &mut result, width, Product { x: &x, depth, a, start: Start::Result, finish });
             let mut turned = vec![Lanes::default(); panels * LANES * (width + 1).div_ceil(LANES)];
-            transpose_on(path, &mut turned, &result, width);
-            tanh_on(path, &mut turned);
+            on::transpose(path, &mut turned, &result, width);
+            on::tanh(path, &mut turned);
             [bits(&result), bits(&turned)]
         };
         let finishes = [Finish::Nothing, Finish::Tanh, Finish::Relu, Finish::TanhSlope(&y), Finish::ReluSlope(&y)];
@@ -105,13 +106,13 @@ fn tanh_is_close_everywhere_and_keeps_nan() {
     for path in paths() {
         for x in xs.chunks(LANES) {
             let mut y = [Lanes(std::array::from_fn(|i| x[i % x.len()]))];
-            tanh_on(path, &mut y);
+            on::tanh(path, &mut y);
             for (x, y) in x.iter().zip(y[0].0) {
                 assert!((f64::from(y) - libm::tanh(f64::from(*x))).abs() < 3e-7, "{path:?}: tanh({x}) = {y}");
             }
         }
         let mut y = [Lanes::splat(f32::NAN)];
-        tanh_on(path, &mut y);
+        on::tanh(path, &mut y);
         assert!(y[0].0.iter().all(|v| v.is_nan()));
     }
 }
@@ -126,7 +127,7 @@ fn finishes_are_functions_of_the_plain_product() {
             let run = |finish: Finish| {
                 let mut result = vec![Lanes::default(); panels * width];
                 let of = Product { x: &x, depth, a: Coefficients::Matrix(&matrix), start: Start::Zero, finish };
-                product_on(path, &mut result, width, of);
+                on::product(path, &mut result, width, of);
                 result
             };
             let plain = run(Finish::Nothing);
@@ -151,12 +152,12 @@ fn interleaving_puts_rows_into_lanes_and_separating_takes_them_out() {
         for entries in [0, 1, 7, 8, 9, 16, 53] {
             let rows: [Vec<f32>; LANES] = std::array::from_fn(|r| (0..entries + 2).map(|i| value(100 * r + i)).collect());
             let mut panel = vec![Lanes::splat(9.0); entries];
-            interleave_on(path, &mut panel, std::array::from_fn(|r| rows[r].as_slice()));
+            on::interleave(path, &mut panel, std::array::from_fn(|r| rows[r].as_slice()));
             for (i, r) in (0..entries).flat_map(|i| (0..LANES).map(move |r| (i, r))) {
                 assert_eq!(panel[i].0[r], rows[r][i], "{path:?}, row {r}, entry {i} of {entries}");
             }
             let mut back = rows.clone().map(|row| vec![9.0; row.len()]);
-            separate_on(path, back.each_mut().map(Vec::as_mut_slice), &panel);
+            on::separate(path, back.each_mut().map(Vec::as_mut_slice), &panel);
             for (row, back) in rows.iter().zip(&back) {
                 assert_eq!(
                     (&row[..entries], &back[entries..]),
@@ -175,7 +176,7 @@ fn transposing_turns_entries_into_lanes() {
             let from = lanes(panels * entries, 7);
             let samples = panels * LANES;
             let mut to = vec![Lanes::splat(9.0); samples * (entries + 1).div_ceil(LANES)];
-            transpose_on(path, &mut to, &from, entries);
+            on::transpose(path, &mut to, &from, entries);
             for (r, i) in (0..samples).flat_map(|r| (0..(entries + 1).next_multiple_of(LANES)).map(move |i| (r, i))) {
                 let expected = match i.cmp(&entries) {
                     Ordering::Less => from[r / LANES * entries + i].0[r % LANES],
@@ -199,5 +200,24 @@ fn runs_cover_a_range_evenly() {
         let parts: Vec<usize> = spans(panels, most).flat_map(|(size, times)| std::iter::repeat_n(size, times)).collect();
         assert_eq!(parts.iter().sum::<usize>(), panels);
         assert!(parts.iter().all(|size| (2..=most.max(3)).contains(size) || panels == 1), "{panels} panels in {parts:?}");
+    }
+}
+
+/// What Adam and the averages do, number by number: wide registers round as narrow ones.
+#[test]
+fn loops_over_many_numbers_have_the_same_bits_on_every_path() {
+    let gradient: Vec<f32> = (0..1003).map(value).collect();
+    let run = |path: Path| {
+        let (mut params, mut second) = (vec![0.3f32; gradient.len()], vec![1e-3f32; gradient.len()]);
+        on::wide(path, || {
+            for ((p, v), g) in params.iter_mut().zip(&mut second).zip(&gradient) {
+                *v = 0.999 * *v + 0.001 * (g * g);
+                *p -= 1e-3 * g / ((*v * 1.7).sqrt() + 1e-8);
+            }
+        });
+        params.into_iter().chain(second).map(f32::to_bits).collect::<Vec<_>>()
+    };
+    for path in paths() {
+        assert_eq!(run(path), run(Path::Portable), "{path:?}");
     }
 }

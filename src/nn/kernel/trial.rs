@@ -1,9 +1,10 @@
 //! Which compilation of the kernel is the fastest here, found by trying: what a processor's instructions promise does not tell, for some
 //! take registers of sixteen floats in halves, and some lower their clock for them.
 
-use super::super::lanes::{LANES, Lanes};
+use super::on;
+use super::operation::{Coefficients, Finish, Product, Start};
 use super::path::Path;
-use super::{Coefficients, Finish, Product, Start, product_on};
+use crate::nn::lanes::{LANES, Lanes};
 use std::time::{Duration, Instant};
 
 /// Entries of a hidden layer, what most products are about.
@@ -44,7 +45,7 @@ pub fn rates() -> Vec<(Path, f64)> {
             let started = Instant::now();
             let of =
                 Product { x: &x, depth: WIDTH, a: Coefficients::Matrix(&matrix), start: Start::Zero, finish: Finish::Nothing };
-            product_on(*path, &mut result, WIDTH, of);
+            on::product(*path, &mut result, WIDTH, of);
             *fastest = started.elapsed().min(*fastest);
         }
     }

@@ -1,0 +1,15 @@
+//! The losses and their gradients. None needs another to have been computed before.
+
+mod acted;
+pub mod behavior_cloning;
+mod model_loss;
+mod policy_loss;
+mod regression;
+pub(in crate::learn) mod shards;
+pub mod state_cloning;
+
+pub use acted::Acted;
+pub use behavior_cloning::behavior_cloning;
+pub use model_loss::ModelLearner;
+pub use policy_loss::{Mixture, PolicyLoss};
+pub use state_cloning::state_cloning;

@@ -1,0 +1,424 @@
+//! Algorithm 1: hybrid imitation learning. Pure behavior cloning, pure state cloning and a fixed mixture are the same loop with
+//! another alpha.
+
+use super::batches::Batches;
+use super::descent::{self, Descent};
+use super::fine_tuning::{self, FineTuning};
+use super::inputs::Inputs;
+use super::mixing::{Averages, Mixing};
+use super::validation::validate;
+use crate::config::{ActionChoice, Alpha, FingerCloning, TrainSettings};
+use crate::error::{Error, Result};
+use crate::interrupt::Interrupt;
+use crate::learn::limits::{affordable, before_the_first_update};
+use crate::learn::losses::behavior_cloning::{self as bc, draw_noise};
+use crate::learn::losses::state_cloning::{self as sc, Pushes, Segment, draw_segments};
+use crate::learn::losses::{Acted, behavior_cloning, state_cloning};
+use crate::learn::models::{Corpus, Dynamics, Policy, PolicySamples, Reader};
+use crate::learn::run::past::{MOST_UPDATES, at_most};
+use crate::learn::run::{EpochMetrics, Mean, Method, Metric, Saved, Stage};
+use crate::nn::cosine;
+use crate::seed::stream;
+use crate::state::JOINTS;
+use rand::seq::SliceRandom;
+use serde::{Deserialize, Serialize};
+use serde_json::{Value, json};
+
+/// Behavior cloning alone, before Algorithm 1: d_conv passes .9 within a few hundred updates of Algorithm 1, which starves L_BC before
+/// the rare phases of a task are learned.
+pub const WARM_START: &str = "warm-start";
+/// Algorithm 1.
+pub const HIL: &str = "hil";
+
+/// HIL, its two parts, and any fixed mixture of them.
+pub struct Hil {
+    seed: u64,
+    settings: TrainSettings,
+    inputs: Inputs,
+    descent: Descent,
+    model: Option<FineTuning>,
+    mixing: Mixing,
+    /// Demos in the order of the last epoch, each of which shuffles that of the one before, and how often they were shuffled.
+    order: (Vec<usize>, u64),
+    /// Updates of all stages: the number of the random streams.
+    draws: u64,
+    work: Work,
+}
+
+/// What an update needs room for.
+struct Work {
+    rows: Vec<usize>,
+    acted: Acted,
+    bc_choices: bc::Choices,
+    bc: bc::Workspace,
+    sc_choices: sc::Choices,
+    sc: sc::Workspace,
+    segments: Vec<Segment>,
+    noise: Vec<f32>,
+    pushes: Pushes,
+}
+
+/// What an update of Algorithm 1 reports; NaN where it was not computed.
+#[derive(Clone, Copy, Debug)]
+pub struct Update {
+    /// L_BC, Eq. 3.
+    pub l_bc: f64,
+    /// L_SC, Eq. 5.
+    pub l_sc: f64,
+    /// L_mix, Eq. 1.
+    pub l_mix: f64,
+    /// d_conv, Eq. 4.
+    pub d_conv: f64,
+    /// alpha.
+    pub alpha: f64,
+    /// L_model, Eq. 6.
+    pub l_model: f64,
+}
+
+impl Hil {
+    /// A fresh policy for these demos. Without a dynamics network alpha must be 0.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] for a missing dynamics network or batches that memory cannot hold; [`Error::Failed`] when tasks differ.
+    pub fn new(inputs: Inputs, dynamics: Option<Dynamics>, alpha: Alpha, settings: &TrainSettings, seed: u64) -> Result<Self> {
+        if alpha != Alpha::Fixed(0.0) && dynamics.is_none() {
+            let help = "state cloning needs a dynamics network: run `hilt pretrain` first, or train with bc";
+            return Err(Error::Usage(help.into()));
+        }
+        inputs.same_task(dynamics.as_ref().map(Dynamics::task))?;
+        let settings = with_a_teacher_for_the_fingers(settings, alpha);
+        let (corpus, units) = (&inputs.train, settings.hidden_units);
+        let most_rows = settings.bc_batch.max(settings.batch * corpus.longest()).min(corpus.rows());
+        affordable(most_rows, settings.hidden_layers, units, "train.batch, train.bc_batch or train.hidden_units")?;
+        let policy = Policy::new(corpus, &settings, &mut stream(seed, "train.init", 0));
+        let work = Work {
+            rows: Vec::with_capacity(most_rows),
+            acted: Acted::new(&policy, most_rows),
+            bc_choices: bc::Choices::new(&settings),
+            bc: bc::Workspace::new(most_rows),
+            sc_choices: sc::Choices::new(&settings, corpus),
+            sc: sc::Workspace::new(most_rows),
+            segments: Vec::with_capacity(most_rows),
+            noise: Vec::with_capacity(most_rows * JOINTS),
+            pushes: Pushes::new(&settings, most_rows),
+        };
+        let per_epoch = per_epoch(corpus, &settings);
+        Ok(Hil {
+            seed,
+            descent: Descent::new(policy, &settings),
+            model: dynamics.map(FineTuning::new),
+            mixing: Mixing::new(alpha, &settings, per_epoch),
+            order: ((0..corpus.demos()).collect(), 0),
+            draws: 0,
+            work,
+            inputs,
+            settings,
+        })
+    }
+
+    /// An epoch of Algorithm 1.
+    fn hybrid_imitation_learning(&mut self, stage: Stage, epoch: u64, interrupt: &Interrupt) -> Result<EpochMetrics> {
+        let (per_epoch, mut order) = (per_epoch(&self.inputs.train, &self.settings), self.shuffled(epoch));
+        let (first, last, steps) = (self.settings.learning_rate, self.settings.final_learning_rate, stage.epochs * per_epoch);
+        let (mut row, mut means) = (EpochMetrics::new(HIL, epoch + 1, stage.epochs), [Mean::default(); 6]);
+        let (mut l_model, mut rate) = (Mean::default(), f64::NAN);
+        for (i, demos) in order.chunks(self.settings.batch.min(order.len())).enumerate() {
+            interrupt.check()?;
+            rate = cosine(first, last, epoch * per_epoch + i as u64, steps);
+            let update = self.update(demos, rate, (i == 0).then_some(&mut row))?;
+            let Update { l_bc, l_sc, l_mix, d_conv, alpha, .. } = update;
+            means.iter_mut().zip([l_bc, l_sc, l_mix, d_conv, alpha]).for_each(|(mean, value)| mean.add(value));
+            if !update.l_model.is_nan() {
+                l_model.add(update.l_model);
+            }
+        }
+        let names = ["l_bc", "l_sc", "l_mix", "d_conv", "alpha"];
+        names.iter().zip(means).for_each(|(name, mean)| row.set(name, mean.get()));
+        row.set("l_model", l_model.get());
+        row.set("learning_rate", rate);
+        self.order = (std::mem::take(&mut order), epoch + 1);
+        Ok(row)
+    }
+
+    /// One update of Algorithm 1 on `demos`, numbers of training demos. With `norms` the lengths of both gradients are measured and
+    /// reported there.
+    ///
+    /// # Errors
+    /// [`Error::Failed`] when a loss is not a number.
+    pub fn update(&mut self, demos: &[usize], learning_rate: f64, norms: Option<&mut EpochMetrics>) -> Result<Update> {
+        self.draws += 1;
+        let finite = self.judge();
+        let (corpus, descent, mixing) = (&self.inputs.train, &mut self.descent, &mut self.mixing);
+        let Work { rows, acted, bc_choices, bc, sc_choices, sc, segments, noise, pushes } = &mut self.work;
+        corpus.rows_of(demos, rows);
+        let samples = PolicySamples { corpus, policy: &descent.policy };
+        acted.forward(samples, rows); // pi_theta in the demos' states, where both losses begin
+
+        // Algorithm 2, Eq. 3-4
+        let mut rng = stream(self.seed, "train.bc", self.draws);
+        let batch = bc::Batch { samples, rows, demos: demos.len() as f64 };
+        let (l_bc, d_conv) = behavior_cloning(acted, batch, bc_choices, &mut rng, bc);
+        finite(l_bc.name, l_bc.value, BC_REMEDY)?;
+        let alpha = mixing.weight(d_conv); // alpha_e = d_conv, no gradient through it
+
+        // Algorithm 3, Eq. 5
+        let l_sc = match &self.model {
+            Some(model) if alpha > 0.0 => {
+                let (mut rng, lengths) = (stream(self.seed, "train.sc", self.draws), demos.iter().map(|d| corpus.demo(*d).len()));
+                draw_segments(lengths.clone(), sc_choices.rho, sc_choices.pairs, &mut rng, segments);
+                draw_noise(sc_choices.action == ActionChoice::Sample, rows.len(), &mut rng, noise);
+                pushes.draw(lengths, &mut rng);
+                let batch = sc::Batch { corpus, rows, demos: demos.len(), segments, noise, pushes: pushes.rows() };
+                let l_sc = state_cloning(&descent.policy, &model.dynamics, acted, batch, sc_choices, sc);
+                finite(l_sc.name, l_sc.value, SC_REMEDY)?;
+                Some(l_sc)
+            }
+            _ => None,
+        };
+        if let Some(row) = norms {
+            let bc = descent.gradient_norm(acted, 1.0 * l_bc);
+            let sc = l_sc.map_or(f64::NAN, |l_sc| descent.gradient_norm(acted, 1.0 * l_sc));
+            mixing.see_norms(bc, sc);
+            row.set("grad_bc", bc);
+            row.set("grad_sc", sc);
+        }
+
+        let l_mix = match l_sc {
+            Some(l_sc) => (1.0 - alpha) * l_bc + alpha * mixing.sc_scale() * l_sc, // Eq. 1
+            None => (1.0 - alpha) * l_bc,
+        };
+        descent.update(acted, l_mix, learning_rate); // Eq. 2
+
+        // Eq. 6, on observed transitions only
+        let mut l_model = f64::NAN;
+        if let Some(model) = self.model.as_mut().filter(|_| self.settings.fine_tune_dynamics && mixing.has_sc()) {
+            let (value, norm) = model.update(corpus, rows, self.settings.dynamics_learning_rate);
+            finite("the loss of the dynamics network (Eq. 6)", value, MODEL_REMEDY)?;
+            finite("the gradient of the dynamics network's loss (Eq. 6)", norm, MODEL_REMEDY)?;
+            l_model = value;
+        }
+        let l_sc = l_sc.map_or(f64::NAN, |l_sc| l_sc.value);
+        Ok(Update { l_bc: l_bc.value, l_sc, l_mix: l_mix.value(), d_conv, alpha, l_model })
+    }
+
+    /// An epoch of the warm start: pairs shuffled across demos.
+    fn warm_start(&mut self, stage: Stage, epoch: u64, interrupt: &Interrupt) -> Result<EpochMetrics> {
+        let total = self.settings.warm_start_updates;
+        let (first, last) = (self.settings.warm_start_learning_rate, self.settings.final_learning_rate);
+        let batches = Batches::new(&self.inputs.train, self.settings.bc_batch);
+        let shuffled = batches.shuffled(&mut stream(self.seed, "train.warm-start", epoch));
+        let (mut l_bc, mut d_conv, mut rate) = (Mean::default(), Mean::default(), f64::NAN);
+        for rows in shuffled.iter().take(total.saturating_sub(self.descent.updates) as usize) {
+            interrupt.check()?;
+            rate = cosine(first, last, self.descent.updates, total);
+            let cloned = self.clone_behavior(rows, rate)?;
+            l_bc.add(cloned.l_bc);
+            d_conv.add(cloned.d_conv);
+        }
+        let mut row = EpochMetrics::new(WARM_START, epoch + 1, stage.epochs);
+        let values = [l_bc.get(), l_bc.get(), d_conv.get(), 0.0, rate];
+        ["l_bc", "l_mix", "d_conv", "alpha", "learning_rate"].iter().zip(values).for_each(|(name, value)| row.set(name, value));
+        Ok(row)
+    }
+
+    /// One update of behavior cloning alone (Algorithm 2) on the transitions `rows` of training demos.
+    ///
+    /// # Errors
+    /// [`Error::Failed`] when the loss is not a number.
+    pub fn clone_behavior(&mut self, rows: &[usize], learning_rate: f64) -> Result<Update> {
+        self.draws += 1;
+        let finite = self.judge();
+        let (corpus, descent, Work { acted, bc_choices, bc, .. }) = (&self.inputs.train, &mut self.descent, &mut self.work);
+        let samples = PolicySamples { corpus, policy: &descent.policy };
+        acted.forward(samples, rows);
+        let batch = bc::Batch { samples, rows, demos: rows.len() as f64 / corpus.mean_length() };
+        let mut rng = stream(self.seed, "train.bc", self.draws);
+        let (l_bc, d_conv) = behavior_cloning(acted, batch, bc_choices, &mut rng, bc);
+        finite(l_bc.name, l_bc.value, BC_REMEDY)?;
+        descent.update(acted, 1.0 * l_bc, learning_rate);
+        Ok(Update { l_bc: l_bc.value, l_sc: f64::NAN, l_mix: l_bc.value, d_conv, alpha: 0.0, l_model: f64::NAN })
+    }
+
+    /// The order of the demos in an epoch.
+    fn shuffled(&mut self, epoch: u64) -> Vec<usize> {
+        let (mut order, mut shuffles) = std::mem::take(&mut self.order);
+        if shuffles > epoch || order.is_empty() {
+            (order, shuffles) = ((0..self.inputs.train.demos()).collect(), 0);
+        }
+        (shuffles..=epoch).for_each(|past| order.shuffle(&mut stream(self.seed, "train.order", past)));
+        order
+    }
+
+    /// Refuses a loss that is not a number.
+    fn judge(&self) -> impl Fn(&str, f64, &str) -> Result<()> + use<> {
+        let (first, updates) = (self.draws == 1, self.descent.updates);
+        move |term, value, remedy| match value.is_finite() {
+            true => Ok(()),
+            false if first => {
+                let settings = "train.initial_std, train.tau and the networks' weights";
+                Err(Error::Failed(before_the_first_update(term, value, settings)))
+            }
+            false => Err(Error::Failed(format!("{term} is {value} after {updates} updates of the stage: {remedy}"))),
+        }
+    }
+
+    /// An epoch in which every update was left out teaches nothing, nor will the next.
+    fn refuse_standstill(&self, row: &EpochMetrics, (updates, skipped): (u64, u64)) -> Result<()> {
+        let (made, left_out) = (self.descent.updates - updates, self.descent.skipped - skipped);
+        if left_out < made || made == 0 {
+            return Ok(());
+        }
+        let (term, place, last) = (self.descent.left_out, row.place(), row.updates);
+        Err(Error::Failed(format!(
+            "the gradient of {term} was not finite in any of the {made} updates of {place} (to update {last}): raise train.rho, set \
+             train.clip_norm or lower train.learning_rate"
+        )))
+    }
+
+    /// The training demos.
+    pub fn corpus(&self) -> &Corpus {
+        &self.inputs.train
+    }
+
+    /// The policy, to be spoilt.
+    #[cfg(test)]
+    pub fn policy_mut(&mut self) -> &mut Policy {
+        &mut self.descent.policy
+    }
+
+    /// What an update works on: for its cost.
+    pub(super) fn parts(&self) -> (&Policy, Option<&Dynamics>, &[Segment]) {
+        (&self.descent.policy, self.model.as_ref().map(|model| &model.dynamics), &self.work.segments)
+    }
+}
+
+const BC_REMEDY: &str = "lower train.learning_rate or train.warm_start_learning_rate";
+const SC_REMEDY: &str = "raise train.rho, set train.clip_norm, or lower train.learning_rate or train.dynamics_learning_rate";
+const MODEL_REMEDY: &str = "lower train.dynamics_learning_rate";
+
+/// Updates of an epoch of Algorithm 1.
+fn per_epoch(corpus: &Corpus, settings: &TrainSettings) -> u64 {
+    corpus.demos().div_ceil(settings.batch.min(corpus.demos())) as u64
+}
+
+/// Commands of fingers that do not follow are left to L_BC; where L_BC has no weight, they stay with L_SC.
+fn with_a_teacher_for_the_fingers(settings: &TrainSettings, alpha: Alpha) -> TrainSettings {
+    let left_to_bc = settings.sc_fingers == FingerCloning::Following && alpha == Alpha::Fixed(1.0);
+    TrainSettings { sc_fingers: if left_to_bc { FingerCloning::All } else { settings.sc_fingers }, ..settings.clone() }
+}
+
+/// What of [`Hil`] is no array.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+struct Counts {
+    draws: u64,
+    descent: descent::Counts,
+    /// Steps of the dynamics network's optimiser.
+    model: Option<u32>,
+    averages: Averages,
+}
+
+impl Method for Hil {
+    fn stages(&self) -> Vec<Stage> {
+        let updates = self.settings.warm_start_updates;
+        let of_warm_start = Batches::new(&self.inputs.train, self.settings.bc_batch).per_epoch();
+        let epochs = self.settings.epochs_of(per_epoch(&self.inputs.train, &self.settings));
+        vec![Stage { name: WARM_START, epochs: updates.div_ceil(of_warm_start) }, Stage { name: HIL, epochs }]
+    }
+
+    fn metrics(&self) -> &'static [Metric] {
+        &super::hil_metrics::METRICS
+    }
+
+    fn begin(&mut self, stage: &str) {
+        self.descent.begin_stage();
+        if stage == HIL {
+            self.mixing.averages = Averages::default();
+        }
+    }
+
+    fn epoch(&mut self, stage: Stage, epoch: u64, interrupt: &Interrupt) -> Result<EpochMetrics> {
+        let before = (self.descent.updates, self.descent.skipped);
+        let mut row = match stage.name {
+            WARM_START => self.warm_start(stage, epoch, interrupt)?,
+            _ => self.hybrid_imitation_learning(stage, epoch, interrupt)?,
+        };
+        row.updates = self.descent.updates;
+        row.set("skipped_updates", self.descent.skipped as f64);
+        self.descent.update_averaged();
+        let mut rng = stream(self.seed, "train.validate", self.draws);
+        validate(
+            &self.descent.averaged,
+            &self.inputs.validation,
+            &self.work.bc_choices,
+            self.model.as_mut(),
+            &mut rng,
+            &mut row,
+        )?;
+        self.refuse_standstill(&row, before)?;
+        Ok(row)
+    }
+
+    fn end(&mut self, _stage: &str) {
+        self.descent.end_stage();
+    }
+
+    fn policy(&self) -> &Policy {
+        &self.descent.averaged
+    }
+
+    fn save(&self) -> Saved {
+        let mut tensors = Vec::new();
+        let descent = self.descent.save(&mut tensors);
+        let model = self.model.as_ref().map(|model| model.save(&mut tensors));
+        let counts = Counts { draws: self.draws, descent, model, averages: self.mixing.averages };
+        Saved { tensors, counts: json!(counts) }
+    }
+
+    fn restore(&mut self, counts: &Value, tensors: &Reader, last: &EpochMetrics) -> std::result::Result<(), String> {
+        let counts = Counts::deserialize(counts).map_err(|why| format!("its counts: {why}"))?;
+        at_most("draws", counts.draws, MOST_UPDATES)?;
+        counts.averages.check()?;
+        self.descent.restore(tensors, &counts.descent, (last.updates, last.get("skipped_updates") as u64))?;
+        if let Some(model) = &mut self.model {
+            model.restore(tensors, counts.model.ok_or("it was made without a dynamics network")?)?;
+        }
+        (self.draws, self.mixing.averages) = (counts.draws, counts.averages);
+        Ok(())
+    }
+
+    fn remedy(&self, tensor: &str) -> (&'static str, &'static str) {
+        if tensor.starts_with(fine_tuning::NET) {
+            ("the dynamics network (Eq. 6)", MODEL_REMEDY)
+        } else {
+            ("the policy (L_mix, Eq. 1)", POLICY_REMEDY)
+        }
+    }
+
+    fn finish(self: Box<Self>) -> (Policy, Option<Dynamics>) {
+        (self.descent.policy, self.model.map(|model| model.dynamics))
+    }
+}
+
+const POLICY_REMEDY: &str = "lower train.learning_rate or train.warm_start_learning_rate, or set train.clip_norm";
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn without_l_bc_no_finger_is_left_alone() {
+        let of = |sc_fingers, alpha| {
+            with_a_teacher_for_the_fingers(&TrainSettings { sc_fingers, ..Default::default() }, alpha).sc_fingers
+        };
+        assert_eq!(of(FingerCloning::Following, Alpha::Fixed(1.0)), FingerCloning::All);
+        assert_eq!(of(FingerCloning::Following, Alpha::Adaptive), FingerCloning::Following);
+        assert_eq!(of(FingerCloning::None, Alpha::Fixed(1.0)), FingerCloning::None);
+    }
+
+    #[test]
+    fn few_demos_get_more_epochs() {
+        let settings = TrainSettings { epochs: 60, min_updates: 2000, ..Default::default() };
+        assert_eq!([3, 34, 100].map(|per_epoch| settings.epochs_of(per_epoch)), [667, 60, 60]);
+        assert_eq!(TrainSettings { epochs: 0, ..settings }.epochs_of(3), 0);
+    }
+}

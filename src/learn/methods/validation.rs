@@ -1,0 +1,95 @@
+//! What the averaged weights are worth on the validation demos.
+
+use super::fine_tuning::FineTuning;
+use crate::error::{Error, Result};
+use crate::learn::losses::behavior_cloning::{self as bc, Batch, Choices};
+use crate::learn::models::{Corpus, Policy, PolicySamples, row};
+use crate::learn::run::EpochMetrics;
+use crate::state::{ARM_JOINTS, JOINTS};
+use rand::Rng;
+
+/// Labelled finger velocity above which the hand closes or holds, and below whose negative it opens \[rad/s\].
+const FINGER_COMMAND_RAD_S: f32 = 0.2;
+
+/// Root mean square error of the mean action on the validation demos \[rad/s\].
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct ActionError {
+    /// The six arm joints.
+    arm: f64,
+    /// The three fingers.
+    fingers: f64,
+}
+
+/// Reports L_BC, the errors of the mean actions and, with a dynamics network, L_model.
+///
+/// # Errors
+/// [`Error::Failed`] when a loss is none: an epoch may end just after its last update has gone wrong.
+pub fn validate(
+    policy: &Policy,
+    held_out: &Corpus,
+    choices: &Choices,
+    model: Option<&mut FineTuning>,
+    rng: &mut impl Rng,
+    metrics: &mut EpochMetrics,
+) -> Result<()> {
+    let rows: Vec<usize> = (0..held_out.rows()).collect();
+    let samples = PolicySamples { corpus: held_out, policy };
+    let (l_bc, mean) = bc::validate(Batch { samples, rows: &rows, demos: held_out.demos() as f64 }, choices, rng);
+    let scaling = policy.action_scaling();
+    let label = |r: usize, i: usize| scaling.apply(i, held_out.commanded(r)[i]);
+    let classes = ["opening", "still", "closing"].into_iter();
+    for (class, error) in classes.zip(action_errors(label, &mean, &scaling.std, &scaling.mean)) {
+        metrics.set(&format!("arm_error_{class}_rad_s"), error.arm);
+        metrics.set(&format!("finger_error_{class}_rad_s"), error.fingers);
+    }
+    metrics.set("validation_l_bc", l_bc);
+    check("L_BC (Eq. 3)", l_bc, metrics, "lower train.learning_rate or train.warm_start_learning_rate, or set train.clip_norm")?;
+    if let Some(model) = model {
+        let l_model = model.validate(held_out);
+        metrics.set("validation_l_model", l_model);
+        check("the loss of the dynamics network (Eq. 6)", l_model, metrics, "lower train.dynamics_learning_rate")?;
+    }
+    Ok(())
+}
+
+fn check(term: &str, value: f64, row: &EpochMetrics, remedy: &str) -> Result<()> {
+    if value.is_finite() {
+        return Ok(());
+    }
+    let (place, updates) = (row.place(), row.updates);
+    Err(Error::Failed(format!("{term} on the validation demos is {value} after {place} (update {updates}): {remedy}")))
+}
+
+/// Errors of mean actions (standardised, rows x 9) against entry i of the label of row r, by what the labelled fingers do.
+fn action_errors(label: impl Fn(usize, usize) -> f32, mean: &[f32], unit: &[f32], offset: &[f32]) -> [ActionError; 3] {
+    let mut sums = [[0.0f64; 3]; 3]; // arm, fingers, rows
+    for r in 0..mean.len() / JOINTS {
+        let (label, mean): ([f32; JOINTS], _) = (std::array::from_fn(|i| label(r, i)), row(mean, JOINTS, r));
+        let fingers = (ARM_JOINTS..JOINTS).map(|i| offset[i] + unit[i] * label[i]).sum::<f32>() / (JOINTS - ARM_JOINTS) as f32;
+        let class = 1 + usize::from(fingers > FINGER_COMMAND_RAD_S) - usize::from(fingers < -FINGER_COMMAND_RAD_S);
+        let square = |i: usize| f64::from(unit[i] * (mean[i] - label[i])).powi(2);
+        sums[class][0] += (0..ARM_JOINTS).map(square).sum::<f64>();
+        sums[class][1] += (ARM_JOINTS..JOINTS).map(square).sum::<f64>();
+        sums[class][2] += 1.0;
+    }
+    sums.map(|[arm, fingers, rows]| ActionError {
+        arm: (arm / (rows * ARM_JOINTS as f64)).sqrt(),
+        fingers: (fingers / (rows * (JOINTS - ARM_JOINTS) as f64)).sqrt(),
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn errors_go_to_the_class_of_the_labelled_fingers() {
+        let mut targets = vec![0.0; 2 * JOINTS];
+        targets[ARM_JOINTS..JOINTS].fill(0.8);
+        let mut mean = targets.clone();
+        (0..ARM_JOINTS).for_each(|i| mean[i] += 0.1);
+        let errors = action_errors(|r, i| targets[r * JOINTS + i], &mean, &[2.0; JOINTS], &[0.0; JOINTS]);
+        assert!((errors[2].arm - 0.2).abs() < 1e-6 && errors[2].fingers == 0.0);
+        assert!(errors[1].arm == 0.0 && errors[0].arm.is_nan());
+    }
+}

@@ -1,0 +1,276 @@
+//! f_phi: the next state from a state and the action that the motors were given.
+
+use super::corpus::Corpus;
+use super::features::Features;
+use super::scaling::Scaling;
+use super::weights::{Reader, push_features, push_network, push_scaling};
+use crate::config::{PretrainSettings, Structure};
+use crate::nn::{Lanes, Mlp, Pass};
+use crate::state::{Action, BASE_DIM, CONTROL_DT_S, JOINTS};
+use crate::tasks::Task;
+use crate::tensor::NamedTensor;
+use rand::Rng;
+use serde_json::{Value, json};
+
+/// Spread of an action below which it counts as constant \[rad/s\].
+const ACTION_FLOOR_RAD_S: f32 = 0.01;
+/// Spread of a change in one step below which it counts as noise (0.1 mm, 0.1 mrad, 0.1 mrad/s).
+pub const STEP_FLOOR: f32 = 1e-4;
+/// Duration of a control step \[s\].
+pub const DT_S: f32 = CONTROL_DT_S as f32;
+
+/// f_phi with everything needed to run it: s' = s + known change + network, entry by entry; the constants of an episode are copied.
+/// The predicted quaternion is not normalised again: over the steps of one segment it leaves unit length by less than the loss sees.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Dynamics {
+    task: Task,
+    structure: Structure,
+    features: Features,
+    action: Scaling,
+    residual: Scaling,
+    pub(in crate::learn) net: Mlp,
+    settings: PretrainSettings,
+}
+
+impl Dynamics {
+    /// A network with random weights; scalings from the training demos.
+    pub(in crate::learn) fn new(corpus: &Corpus, settings: &PretrainSettings, rng: &mut impl Rng) -> Self {
+        let features = Features::fit(corpus, settings.features, false);
+        let mut widths = vec![settings.hidden_units; settings.hidden_layers + 2];
+        (widths[0], widths[settings.hidden_layers + 1]) = (features.width() + JOINTS, BASE_DIM);
+        let mut dynamics = Dynamics {
+            task: corpus.task,
+            structure: settings.structure,
+            features,
+            action: Scaling::fit(corpus.rows(), JOINTS, ACTION_FLOOR_RAD_S, |r, row| row.copy_from_slice(corpus.executed(r))),
+            residual: Scaling { mean: vec![0.0; BASE_DIM], std: vec![1.0; BASE_DIM] },
+            net: Mlp::new(&widths, settings.activation, rng),
+            settings: settings.clone(),
+        };
+        dynamics.residual = Scaling::fit(corpus.rows(), BASE_DIM, STEP_FLOOR, |r, row| {
+            let (state, action, next) = (corpus.state(r), corpus.executed(r), corpus.next(r));
+            row.iter_mut().enumerate().for_each(|(i, v)| *v = next[i] - dynamics.known_next(i, state[i], action[i % JOINTS]));
+        });
+        dynamics
+    }
+
+    /// The task it was trained on.
+    pub fn task(&self) -> Task {
+        self.task
+    }
+
+    /// The settings it was trained with.
+    pub fn settings(&self) -> &PretrainSettings {
+        &self.settings
+    }
+
+    pub(in crate::learn) fn features(&self) -> &Features {
+        &self.features
+    }
+
+    pub(in crate::learn) fn action_scaling(&self) -> &Scaling {
+        &self.action
+    }
+
+    pub(in crate::learn) fn residual_scaling(&self) -> &Scaling {
+        &self.residual
+    }
+
+    pub(in crate::learn) fn structure(&self) -> Structure {
+        self.structure
+    }
+
+    /// The network's inputs for a panel of states and actions \[rad/s\].
+    pub(in crate::learn) fn write_inputs(&self, state: &[Lanes], action: &[Lanes], out: &mut [Lanes]) {
+        let (seen, given) = out.split_at_mut(self.features.width());
+        self.features.forward(state, &self.features.hand(state), seen);
+        self.write_action(action, given);
+    }
+
+    /// The last nine inputs.
+    pub(in crate::learn) fn write_action(&self, action: &[Lanes], given: &mut [Lanes]) {
+        given.iter_mut().zip(action).enumerate().for_each(|(i, (slot, a))| *slot = a.map(|a| self.action.apply(i, a)));
+    }
+
+    /// What entry `i` of a state is known to become before learning; `action` is its joint's.
+    #[inline]
+    fn known_next(&self, i: usize, state: f32, action: f32) -> f32 {
+        match self.structure {
+            Structure::Kinematic if i < JOINTS => state + DT_S * action,
+            Structure::Kinematic if i < 2 * JOINTS => action,
+            _ => state,
+        }
+    }
+
+    /// Gradient with respect to states, but for the network's part, from that with respect to the next states: in place, as every entry
+    /// is known to stay, except that a kinematic structure does not look at dq.
+    pub(in crate::learn) fn known_backward(&self, d_state: &mut [Lanes]) {
+        if self.structure == Structure::Kinematic {
+            d_state[JOINTS..2 * JOINTS].fill(Lanes::default());
+        }
+    }
+
+    /// The next states' changing entries from the network's output.
+    pub(in crate::learn) fn write_next(&self, state: &[Lanes], action: &[Lanes], output: &[Lanes], next: &mut [Lanes]) {
+        for (i, slot) in next.iter_mut().enumerate() {
+            let (state, action, output) = (state[i].0, action[i % JOINTS].0, output[i].0);
+            *slot = Lanes(std::array::from_fn(|l| self.known_next(i, state[l], action[l]) + self.residual.undo(i, output[l])));
+        }
+    }
+
+    /// What the network must put out for the observed next states, in their place.
+    pub(in crate::learn) fn write_residuals(&self, state: &[Lanes], action: &[Lanes], next: &mut [Lanes]) {
+        for (i, slot) in next.iter_mut().enumerate() {
+            let (state, action, next) = (state[i].0, action[i % JOINTS].0, slot.0);
+            let residual = |l: usize| self.residual.apply(i, next[l] - self.known_next(i, state[l], action[l]));
+            *slot = Lanes(std::array::from_fn(residual));
+        }
+    }
+
+    /// Predicted next state row after `action` \[rad/s\] in `state_row`.
+    ///
+    /// # Panics
+    /// When the row is not the task's.
+    pub fn predict(&self, state_row: &[f32], action: &Action) -> Vec<f32> {
+        assert_eq!(state_row.len(), self.task.state_dim(), "the row of another task than {}", self.task);
+        let action = action.map(|v| Lanes::splat(v as f32));
+        let mut state: Vec<Lanes> = state_row.iter().map(|v| Lanes::splat(*v)).collect();
+        self.step(&mut state, &action, &mut Pass::new(&self.net, 1));
+        state.iter().map(|entry| entry.0[0]).collect()
+    }
+
+    /// A panel of states becomes the next ones; `pass` has room for one panel.
+    pub(in crate::learn) fn step(&self, state: &mut [Lanes], action: &[Lanes], pass: &mut Pass) {
+        self.write_inputs(state, action, pass.input.panel_mut(0));
+        self.net.forward(pass, 0..1);
+        let mut next = [Lanes::default(); BASE_DIM];
+        self.write_next(state, action, pass.output.panel(0), &mut next);
+        state[..BASE_DIM].copy_from_slice(&next);
+    }
+
+    /// All arrays.
+    pub fn to_tensors(&self) -> Vec<NamedTensor> {
+        let mut out = Vec::new();
+        push_features(&mut out, "dynamics", &self.features);
+        push_scaling(&mut out, "dynamics.action", &self.action);
+        push_scaling(&mut out, "dynamics.residual", &self.residual);
+        push_network(&mut out, "dynamics", &self.net);
+        out
+    }
+
+    /// All that is not an array.
+    pub fn meta(&self) -> Value {
+        let (features, mask_dq) = self.features.choice();
+        let widths = self.net.widths();
+        json!({
+            "network": "dynamics",
+            "task": self.task,
+            "state_dim": self.task.state_dim(),
+            "features": features,
+            "mask_dq": mask_dq,
+            "structure": self.structure,
+            "activation": self.net.activation(),
+            "hidden": &widths[1..widths.len() - 1],
+            "settings": self.settings,
+        })
+    }
+
+    /// The inverse of [`Dynamics::to_tensors`] and [`Dynamics::meta`].
+    ///
+    /// # Errors
+    /// Says what is missing or does not fit, with both numbers.
+    pub fn from_tensors(tensors: &[NamedTensor], meta: &Value) -> Result<Self, String> {
+        let reader = Reader { tensors, meta };
+        let task = reader.task("dynamics")?;
+        let settings = settings_of(&reader)?;
+        settings.validate().map_err(|why| format!("its settings cannot have trained it: {why}"))?;
+        let features = reader.features("dynamics", task)?;
+        let net = reader.network("dynamics", features.width() + JOINTS, BASE_DIM)?;
+        Ok(Dynamics {
+            task,
+            structure: reader.meta("structure")?,
+            features,
+            action: reader.scaling("dynamics.action", JOINTS)?,
+            residual: reader.scaling("dynamics.residual", BASE_DIM)?,
+            net,
+            settings,
+        })
+    }
+}
+
+/// Keys that settings of older networks have, with the only value under which this version computes what they did.
+const RETIRED: [(&str, u64); 2] = [("steps", 1), ("ensemble", 1)];
+
+/// The settings that a network was trained with, by this version or an older one.
+fn settings_of(reader: &Reader) -> Result<PretrainSettings, String> {
+    let mut settings: Value = reader.meta("settings")?;
+    for (key, neutral) in RETIRED {
+        match settings.as_object_mut().and_then(|all| all.remove(key)) {
+            Some(value) if value != neutral => {
+                return Err(format!("it was trained with pretrain.{key} = {value}, which hilt no longer has; pretrain it anew"));
+            }
+            _ => {}
+        }
+    }
+    Reader { tensors: reader.tensors, meta: &json!({ "settings": settings }) }.meta("settings")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::learn::models::{ModelSamples, Samples};
+    use crate::learn::tests::testing::demos;
+    use crate::seed::stream;
+
+    #[test]
+    fn dynamics_survive_their_tensors_and_copy_the_context() {
+        let corpus = Corpus::new(demos(Task::Stack, 3, 20, 0), "training").expect("demos");
+        for structure in [Structure::Plain, Structure::Kinematic] {
+            let settings = PretrainSettings { structure, ..Default::default() };
+            let dynamics = Dynamics::new(&corpus, &settings, &mut stream(0, "test", 0));
+            let back = Dynamics::from_tensors(&dynamics.to_tensors(), &dynamics.meta());
+            assert_eq!(back.as_ref(), Ok(&dynamics));
+            let next = dynamics.predict(corpus.state(4), &[0.1; JOINTS]);
+            assert_eq!(next[BASE_DIM..], corpus.state(4)[BASE_DIM..]);
+        }
+    }
+
+    #[test]
+    fn a_description_out_of_its_limits_is_refused() {
+        let corpus = Corpus::new(demos(Task::Stack, 3, 20, 0), "training").expect("demos");
+        let dynamics = Dynamics::new(&corpus, &PretrainSettings::default(), &mut stream(0, "test", 0));
+        for (key, value, said) in [
+            ("hidden", json!([0]), "is [0]: networks have 1 to 16 hidden layers of 1 to 4096 units"),
+            ("settings", json!({ "hidden_units": u64::MAX }), "its settings cannot have trained it"),
+            ("settings", json!({ "ensemble": 5 }), "pretrain.ensemble = 5, which hilt no longer has"),
+            ("settings", json!({ "steps": 1, "ensembles": 1 }), "unknown field `ensembles`"),
+        ] {
+            let mut meta = dynamics.meta();
+            meta[key] = value;
+            let message = Dynamics::from_tensors(&dynamics.to_tensors(), &meta).expect_err(key);
+            assert!(message.contains(said), "{key}: {message}");
+        }
+    }
+
+    #[test]
+    fn a_network_of_an_older_version_is_read() {
+        let corpus = Corpus::new(demos(Task::Stack, 3, 20, 0), "training").expect("demos");
+        let dynamics = Dynamics::new(&corpus, &PretrainSettings::default(), &mut stream(0, "test", 0));
+        let mut meta = dynamics.meta();
+        (meta["settings"]["steps"], meta["settings"]["ensemble"]) = (json!(1), json!(1));
+        assert_eq!(Dynamics::from_tensors(&dynamics.to_tensors(), &meta).as_ref(), Ok(&dynamics));
+    }
+
+    #[test]
+    fn the_target_undoes_the_prediction() {
+        let corpus = Corpus::new(demos(Task::PickUp, 2, 20, 0), "training").expect("demos");
+        let dynamics = Dynamics::new(&corpus, &PretrainSettings::default(), &mut stream(0, "test", 0));
+        let (mut next, mut output) = ([Lanes::default(); BASE_DIM], [Lanes::default(); BASE_DIM]);
+        ModelSamples { corpus: &corpus, dynamics: &dynamics }.write_targets(&[7], &mut output);
+        let splat = |row: &[f32]| -> Vec<Lanes> { row.iter().map(|v| Lanes::splat(*v)).collect() };
+        dynamics.write_next(&splat(corpus.state(7)), &splat(corpus.executed(7)), &output, &mut next);
+        for (a, b) in next.iter().zip(corpus.next(7)) {
+            assert!((a.0[0] - b).abs() < 1e-6, "{a:?} against {b}");
+        }
+    }
+}

@@ -1,0 +1,22 @@
+//! What is learned, and what it is learned from: the policy pi_theta, the dynamics network f_phi, their inputs, the demos side by side.
+
+mod corpus;
+mod dynamics;
+mod features;
+mod hand;
+mod model_report;
+mod policy;
+mod relations;
+mod samples;
+mod scaling;
+mod weights;
+
+pub use corpus::{Corpus, row};
+pub use dynamics::{DT_S, Dynamics, STEP_FLOOR};
+pub use features::Features;
+pub use hand::Hand;
+pub use model_report::{ModelReport, error_table};
+pub use policy::Policy;
+pub use samples::{ModelSamples, PolicySamples, Samples};
+pub use scaling::Scaling;
+pub use weights::{Reader, vector};

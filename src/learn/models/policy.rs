@@ -1,0 +1,231 @@
+//! pi_theta: a Gaussian over joint velocity commands whose mean is a network of the state.
+
+use super::corpus::Corpus;
+use super::features::Features;
+use super::scaling::Scaling;
+use super::weights::{Reader, push_features, push_network, push_scaling, vector};
+use crate::config::{MOST_STEPS, TrainSettings};
+use crate::math::{exp_f32, ln};
+use crate::nn::{Lanes, Mlp, Pass};
+use crate::seed::normal;
+use crate::state::JOINTS;
+use crate::tasks::Task;
+use crate::tensor::NamedTensor;
+use rand::Rng;
+use serde_json::{Value, json};
+
+/// Spread of the demo actions below which they count as constant \[rad/s\].
+const ACTION_FLOOR_RAD_S: f32 = 0.01;
+/// The horizon of an episode over the 95th percentile of the demos' lengths.
+const HORIZON_OVER_P95: usize = 2;
+/// The longest horizon: no demo has more steps than `simulate.max_steps` may be.
+const MOST_HORIZON_STEPS: u32 = HORIZON_OVER_P95 as u32 * MOST_STEPS;
+
+/// pi_theta with everything needed to run it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Policy {
+    task: Task,
+    horizon_steps: u32,
+    features: Features,
+    action: Scaling,
+    pub(in crate::learn) net: Mlp,
+    /// Log standard deviations, in units of the demo actions' own.
+    pub(in crate::learn) log_std: Vec<f32>,
+    settings: TrainSettings,
+}
+
+impl Policy {
+    /// A policy with random weights; scalings and horizon from the training demos.
+    pub(in crate::learn) fn new(corpus: &Corpus, settings: &TrainSettings, rng: &mut impl Rng) -> Self {
+        let features = Features::fit(corpus, settings.features, settings.mask_dq);
+        let mut widths = vec![settings.hidden_units; settings.hidden_layers + 2];
+        (widths[0], widths[settings.hidden_layers + 1]) = (features.width(), JOINTS);
+        let mut lengths: Vec<usize> = (0..corpus.demos()).map(|i| corpus.demo(i).len()).collect();
+        lengths.sort_unstable();
+        let p95 = lengths[(lengths.len() * 95).div_ceil(100) - 1];
+        Policy {
+            task: corpus.task,
+            horizon_steps: (HORIZON_OVER_P95 * p95) as u32,
+            features,
+            action: Scaling::fit(corpus.rows(), JOINTS, ACTION_FLOOR_RAD_S, |r, row| row.copy_from_slice(corpus.commanded(r))),
+            net: Mlp::new(&widths, settings.activation, rng),
+            log_std: vec![ln(settings.initial_std.max(settings.std_floor)) as f32; JOINTS],
+            settings: settings.clone(),
+        }
+    }
+
+    /// The task it was trained on.
+    pub fn task(&self) -> Task {
+        self.task
+    }
+
+    /// Control steps after which an episode is given up: twice the 95th percentile of the training demos' lengths.
+    pub fn horizon_steps(&self) -> u32 {
+        self.horizon_steps
+    }
+
+    /// The settings it was trained with.
+    pub fn settings(&self) -> &TrainSettings {
+        &self.settings
+    }
+
+    pub(in crate::learn) fn features(&self) -> &Features {
+        &self.features
+    }
+
+    pub(in crate::learn) fn action_scaling(&self) -> &Scaling {
+        &self.action
+    }
+
+    /// Mean action in `state_row` (`task.state_dim()` numbers, see [`crate::state::State::to_row`]) \[rad/s\].
+    ///
+    /// # Panics
+    /// When the row is not the task's.
+    pub fn act(&self, state_row: &[f32]) -> [f32; JOINTS] {
+        let mean = self.mean(state_row);
+        std::array::from_fn(|i| self.action.undo(i, mean[i]))
+    }
+
+    /// An action drawn from the Gaussian \[rad/s\].
+    ///
+    /// # Panics
+    /// When the row is not the task's.
+    pub fn sample(&self, state_row: &[f32], rng: &mut impl Rng) -> [f32; JOINTS] {
+        let mean = self.mean(state_row);
+        let noise: [f32; JOINTS] = std::array::from_fn(|_| normal(rng) as f32);
+        std::array::from_fn(|i| self.action.undo(i, mean[i] + exp_f32(self.log_std[i]) * noise[i]))
+    }
+
+    fn mean(&self, state_row: &[f32]) -> [f32; JOINTS] {
+        assert_eq!(state_row.len(), self.task.state_dim(), "the row of another task than {}", self.task);
+        let mut pass = Pass::new(&self.net, 1);
+        let state: Vec<Lanes> = state_row.iter().map(|v| Lanes::splat(*v)).collect();
+        self.features.forward(&state, &self.features.hand(&state), pass.input.panel_mut(0));
+        self.net.forward(&mut pass, 0..1);
+        std::array::from_fn(|i| pass.output.get(0, i))
+    }
+
+    /// All arrays.
+    pub fn to_tensors(&self) -> Vec<NamedTensor> {
+        let mut out = Vec::new();
+        push_features(&mut out, "policy", &self.features);
+        push_scaling(&mut out, "policy.action", &self.action);
+        push_network(&mut out, "policy", &self.net);
+        out.push(vector("policy.log_std", &self.log_std));
+        out
+    }
+
+    /// All that is not an array.
+    pub fn meta(&self) -> Value {
+        let (features, mask_dq) = self.features.choice();
+        let widths = self.net.widths();
+        json!({
+            "network": "policy",
+            "task": self.task,
+            "state_dim": self.task.state_dim(),
+            "features": features,
+            "mask_dq": mask_dq,
+            "activation": self.net.activation(),
+            "hidden": &widths[1..widths.len() - 1],
+            "horizon_steps": self.horizon_steps,
+            "settings": self.settings,
+        })
+    }
+
+    /// The inverse of [`Policy::to_tensors`] and [`Policy::meta`].
+    ///
+    /// # Errors
+    /// Says what is missing or does not fit, with both numbers.
+    pub fn from_tensors(tensors: &[NamedTensor], meta: &Value) -> Result<Self, String> {
+        let reader = Reader { tensors, meta };
+        let task = reader.task("policy")?;
+        let horizon_steps: u32 = reader.meta("horizon_steps")?;
+        if !(1..=MOST_HORIZON_STEPS).contains(&horizon_steps) {
+            return Err(format!("\"horizon_steps\" of the description is {horizon_steps}; allowed: 1 to {MOST_HORIZON_STEPS}"));
+        }
+        let settings: TrainSettings = reader.meta("settings")?;
+        settings.validate().map_err(|why| format!("its settings cannot have trained it: {why}"))?;
+        let features = reader.features("policy", task)?;
+        let net = reader.network("policy", features.width(), JOINTS)?;
+        Ok(Policy {
+            task,
+            horizon_steps,
+            features,
+            action: reader.scaling("policy.action", JOINTS)?,
+            net,
+            log_std: reader.log_std("policy.log_std")?,
+            settings,
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::learn::tests::testing::demos;
+    use crate::seed::stream;
+
+    #[test]
+    fn a_policy_survives_its_tensors_and_refuses_wrong_ones() {
+        let corpus = Corpus::new(demos(Task::Stack, 3, 20, 0), "training").expect("demos");
+        let policy = Policy::new(&corpus, &TrainSettings::default(), &mut stream(0, "test", 0));
+        assert_eq!(policy.horizon_steps(), 44);
+        let (tensors, meta) = (policy.to_tensors(), policy.meta());
+        assert_eq!(Policy::from_tensors(&tensors, &meta).as_ref(), Ok(&policy));
+
+        let refused = |tensors: &[NamedTensor], meta: &Value| Policy::from_tensors(tensors, meta).expect_err("refused");
+        let mut other = meta.clone();
+        other["state_dim"] = json!(28);
+        let message = refused(&tensors, &other);
+        assert!(message.contains("28") && message.contains("32"), "{message}");
+        let mut cut = tensors.clone();
+        cut[4].shape = vec![8];
+        assert!(refused(&cut, &meta).contains("[8]"), "{}", refused(&cut, &meta));
+        assert!(refused(&tensors[1..], &meta).contains("policy.state.mean is missing"));
+        other = meta.clone();
+        other["network"] = json!("dynamics");
+        assert!(refused(&tensors, &other).contains("dynamics"));
+    }
+
+    #[test]
+    fn a_description_out_of_its_limits_is_refused_before_anything_is_made_of_it() {
+        let corpus = Corpus::new(demos(Task::Stack, 3, 20, 0), "training").expect("demos");
+        let policy = Policy::new(&corpus, &TrainSettings::default(), &mut stream(0, "test", 0));
+        for (key, value, said) in [
+            ("hidden", json!([0]), "is [0]: networks have 1 to 16 hidden layers of 1 to 4096 units"),
+            ("hidden", json!([]), "is []: networks have"),
+            ("hidden", json!(vec![8; 17]), "networks have 1 to 16"),
+            ("hidden", json!([u64::MAX, u64::MAX]), "networks have 1 to 16"),
+            ("horizon_steps", json!(0), "is 0; allowed: 1 to 20000"),
+            ("horizon_steps", json!(4_294_967_295u32), "is 4294967295; allowed: 1 to 20000"),
+            ("horizon_steps", json!("9".repeat(100_000)), "(100002 characters)"),
+            ("settings", json!({ "tau": 0.0 }), "train.tau = 0"),
+            ("settings", json!({ "hidden_units": 1e18 as u64 }), "train.hidden_units"),
+        ] {
+            let mut meta = policy.meta();
+            meta[key] = value;
+            let message = Policy::from_tensors(&policy.to_tensors(), &meta).expect_err(key);
+            assert!(message.contains(said) && message.len() < 500, "{key}: {message}");
+        }
+        for (name, value, said) in [
+            ("policy.state.std", 0.0, "above 0"),
+            ("policy.log_std", f32::NAN, "NaN"),
+            ("policy.log_std", 1e30, "allowed: -40 to 40"),
+        ] {
+            let mut tensors = policy.to_tensors();
+            tensors.iter_mut().find(|t| t.name == name).expect("a tensor").data[0] = value;
+            let message = Policy::from_tensors(&tensors, &policy.meta()).expect_err(name);
+            assert!(message.contains(said), "{name}: {message}");
+        }
+    }
+
+    #[test]
+    fn samples_scatter_around_the_mean() {
+        let corpus = Corpus::new(demos(Task::PickUp, 2, 20, 0), "training").expect("demos");
+        let policy = Policy::new(&corpus, &TrainSettings::default(), &mut stream(0, "test", 0));
+        let (row, mut rng) = (corpus.state(3), stream(1, "test", 0));
+        let mean = policy.act(row);
+        let average: f32 = (0..2000).map(|_| policy.sample(row, &mut rng)[0]).sum::<f32>() / 2000.0;
+        assert!((average - mean[0]).abs() < 0.1 * policy.action.std[0], "{average} against {}", mean[0]);
+    }
+}
