@@ -2,7 +2,7 @@
 
 use crate::scene::Scene;
 use crate::state::{Action, FINGERS, JOINTS, State};
-use crate::tasks::{FailureClass, Task};
+use crate::task::{FailureClass, Task};
 use serde::{Deserialize, Serialize};
 
 /// No angle \[rad\], position \[m\], velocity \[rad/s, m/s\] or command of this world is larger: what is comes from a simulation that broke down

@@ -11,11 +11,13 @@
 //! | d = <(s_t^E, a_t^E)> | [`demo::Demo`] | a demonstration: T + 1 states, T actions |
 //! | pi_theta | [`learn::Policy`] | Gaussian: mean network, log standard deviations |
 //! | f_phi | [`learn::Dynamics`] | the next state from a state and an action |
-//! | Algorithm 1: HIL; Eq. 1: L_mix | [`learn::hil`] | BC and SC mixed by alpha, with its warm start; pure BC and SC are the same loop |
-//! | Eq. 2: the update of theta | [`learn::Learner::update`] | Adam on the gradient of L_mix |
-//! | Algorithm 2: BC; Eq. 3: L_BC; Eq. 4: p_t, d_conv | [`learn::behavior_cloning`] | loss on the demos' states, degree of policy convergence |
-//! | Algorithm 3: SC; Eq. 5: L_SC; rho | [`learn::state_cloning`] | rollouts in f_phi, stochastic recovery, gradient through time |
-//! | Algorithm 4; Eq. 6: L_model | [`mod@learn::pretrain_dynamics`] | pretraining of f_phi; [`learn::Learner::fine_tune`] goes on with it |
+//! | Algorithm 1: HIL; Eq. 1: L_mix | [`learn::methods::hil`] | BC and SC mixed by alpha, after a warm start; pure BC and SC are the same loop |
+//! | alpha, its average and cap | [`learn::methods::mixing`] | alpha_e = d_conv, and the balance of the two gradients |
+//! | Eq. 2: the update of theta | [`learn::methods::descent`] | Adam on the gradient of L_mix |
+//! | Algorithm 2: BC; Eq. 3: L_BC; Eq. 4: p_t, d_conv | [`mod@learn::losses::behavior_cloning`] | loss on the demos' states, degree of policy convergence |
+//! | Algorithm 3: SC; Eq. 5: L_SC; rho | [`mod@learn::losses::state_cloning`] | rollouts in f_phi, stochastic recovery, gradient through time |
+//! | Algorithm 4 | [`mod@learn::methods::pretrain_dynamics`] | pretraining of f_phi; [`learn::methods::fine_tuning`] goes on with it |
+//! | Eq. 6: L_model | [`learn::losses::model_loss`] | loss of f_phi on observed transitions |
 //! | N(0, .001) on actions | [`sim`] | noise while demos are recorded and policies evaluated |
 //! | tasks, milestones, success | [`tasks`] | pick-up, pick-and-place, stack: one file each |
 //! | success rates | [`eval`] | seeded rollouts, Wilson intervals, failures by class |
@@ -23,13 +25,14 @@
 //!
 //! # The modules, in the order in which data flow
 //!
-//! A module imports only from those before it; `tests/architecture.rs` holds this, and which modules see which.
+//! A module imports only from those before it, and no files import each other in circles; `tests/architecture` holds both.
 //!
-//! - contracts that all may use: [`state`], [`demo`], [`scene`], [`config`], [`pulse`], [`table`], [`tensor`], [`error`], [`guard`],
-//!   [`interrupt`], [`math`], [`seed`], [`words`]
-//! - [`tasks`], [`robot`], then [`plan`] (scene to demonstration) and [`sim`] (contact physics, the only home of rapier)
+//! - leaves that all may use: [`error`], [`guard`], [`interrupt`], [`math`], [`seed`], [`table`], [`tensor`], [`words`]
+//! - [`nn`]: networks and their engine, knows no robots
+//! - contracts: [`task`], [`state`], [`scene`], [`demo`]; [`robot`]; [`config`], [`pulse`]
+//! - [`tasks`], then [`plan`] (scene to demonstration) and [`sim`] (contact physics, the only home of rapier)
 //! - [`data`]: files, the only home of MCAP, Arrow, Parquet and safetensors; knows no learning
-//! - [`nn`] (networks and their engine, knows no robots), then [`learn`] (the method, knows neither files nor simulator)
+//! - [`learn`]: networks of policy and dynamics, losses, methods, and the loop around them; knows neither files nor simulator
 //! - [`eval`]: policies in the simulator; [`report`]: pictures, charts, tables
 //! - [`cmd`]: the command line
 #![warn(missing_docs)]
@@ -54,6 +57,7 @@ pub mod seed;
 pub mod sim;
 pub mod state;
 pub mod table;
+pub mod task;
 pub mod tasks;
 pub mod tensor;
 pub mod words;

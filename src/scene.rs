@@ -1,7 +1,7 @@
 //! A scene: what stands where when an episode begins. Drawn once per episode, recorded with it.
 
 use crate::state::{Context, Pose};
-use crate::tasks::Task;
+use crate::task::Task;
 use serde::{Deserialize, Serialize};
 
 /// Edge of every block \[m\] (paper 4.1: cubes of 5 cm).
@@ -32,21 +32,4 @@ pub struct Scene {
     pub friction: f64,
     /// Mass of the block \[kg\].
     pub block_mass_kg: f64,
-}
-
-impl Scene {
-    /// Where the block's centre must end: above the start (pick-up), the goal, or on top of the base block \[m\].
-    pub fn target_m(&self) -> [f64; 3] {
-        match self.context {
-            Context::None => {
-                let [x, y, _] = self.block.position_m;
-                [x, y, crate::tasks::pick_up::TARGET_HEIGHT_M]
-            }
-            Context::Goal(goal) => goal,
-            Context::Base(base) => {
-                let [x, y, z] = base.position_m;
-                [x, y, z + BLOCK_EDGE_M]
-            }
-        }
-    }
 }

@@ -1,7 +1,7 @@
 //! State and action of the paper: s_t and a_t, with the names and units of their columns.
 
 use crate::math;
-use crate::tasks::Task;
+use crate::task::Task;
 use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion};
 use serde::{Deserialize, Serialize};
 
@@ -92,6 +92,13 @@ pub struct State {
     pub block: Pose,
     /// What the task adds.
     pub context: Context,
+}
+
+impl Task {
+    /// D: 25, 28 or 32.
+    pub fn state_dim(self) -> usize {
+        BASE_DIM + [0, 3, POSE_DIM][self as usize]
+    }
 }
 
 impl State {

@@ -5,7 +5,7 @@ use crate::config::{Pipeline, Preset, Source, Stage};
 use crate::data::{ContentHash, Provenance};
 use crate::error::{Error, Result};
 use crate::plan::check_ready_pose;
-use crate::tasks::Task;
+use crate::task::Task;
 use std::path::{Path, PathBuf};
 
 /// Where artefacts go unless a flag says otherwise.

@@ -6,7 +6,7 @@ use crate::data::dataset::{self, DatasetEpisode, Episodes, Fingerprint};
 use crate::data::{ContentHash, recording};
 use crate::demo::Episode;
 use crate::error::{Error, Result};
-use crate::tasks::Task;
+use crate::task::Task;
 use rayon::prelude::*;
 use std::borrow::Cow;
 use std::collections::BTreeSet;

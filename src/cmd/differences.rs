@@ -62,7 +62,7 @@ fn flatten(name: &str, value: &Value, out: &mut Vec<(String, Value)>) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::tasks::Task;
+    use crate::task::Task;
     use serde_json::json;
 
     #[test]

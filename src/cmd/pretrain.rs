@@ -7,7 +7,7 @@ use crate::data::{ContentHash, atomic, dataset, table_file, weights};
 use crate::demo::Demo;
 use crate::error::{Error, Result};
 use crate::learn::pretrain_dynamics;
-use crate::tasks::FailureClass;
+use crate::task::FailureClass;
 use crate::{seed, sim};
 use rayon::prelude::*;
 use std::collections::BTreeMap;

@@ -11,7 +11,7 @@ use crate::plan::{Plan, Plans};
 use crate::robot::urdf::urdf;
 use crate::seed;
 use crate::sim::{Disturbance, Follower, run_episode};
-use crate::tasks::FailureClass;
+use crate::task::FailureClass;
 use rayon::prelude::*;
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};

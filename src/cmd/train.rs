@@ -11,7 +11,7 @@ use crate::interrupt::Interrupt;
 use crate::learn::{Checkpoint, Dynamics, Hooks, Inputs, MethodName, Policy, Selection, train};
 use crate::scene::Scene;
 use crate::sim::Controller;
-use crate::tasks::Task;
+use crate::task::Task;
 use crate::words::did_you_mean;
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};

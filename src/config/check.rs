@@ -1,17 +1,16 @@
 //! Refuses settings that are unknown, of a wrong type or out of range, and says what is allowed.
 
+use super::ranges::MOST_OBSTACLES;
 use super::ranges::{RANGES, Range};
 use super::{Pipeline, SceneSettings, Spread};
 use crate::error::{Error, Result};
 use crate::scene::Obstacle;
-use crate::tasks::Task;
+use crate::task::Task;
 use crate::words::{did_you_mean, distance, near, shown};
 use toml::{Table, Value};
 
 /// A longer key is no slip of the finger, and takes long to compare.
 const LONGEST_KEY: usize = 64;
-/// Boxes of a scene: each is kept with every episode, and met by every distance of a plan.
-pub(super) const MOST_OBSTACLES: usize = 100;
 /// Letters of a reason that are kept at each end.
 const KEPT_OF_REASON: usize = 120;
 

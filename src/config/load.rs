@@ -4,7 +4,7 @@ use super::ranges::Range;
 use super::{Pipeline, check};
 use crate::error::{Error, Result};
 use crate::interrupt;
-use crate::tasks::Task;
+use crate::task::Task;
 use crate::words::{shown, unknown};
 use std::fs::File;
 use std::io::Read;

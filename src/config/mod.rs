@@ -22,7 +22,7 @@ pub use scene::{PlanSettings, PulseSettings, SceneSettings, SimulateSettings, Sp
 pub use train::TrainSettings;
 
 use crate::error::{Error, Result};
-use crate::tasks::Task;
+use crate::task::Task;
 use crate::words::unknown;
 use serde::{Deserialize, Serialize};
 use std::str::FromStr;

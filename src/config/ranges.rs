@@ -34,6 +34,8 @@ const fn below(key: &'static str, low: f64, high: f64) -> Range {
 const WORKSPACE_M: f64 = 2.0;
 /// More episodes than any experiment needs, few enough to fit in memory and in five-digit file names.
 const MOST_EPISODES: f64 = 100_000.0;
+/// Boxes of a scene: each is kept with every episode, and met by every distance of a plan.
+pub(super) const MOST_OBSTACLES: usize = 100;
 /// Most control steps of an episode, and samples of a plan: 500 s. Keeps a slip of the finger from allocating all memory.
 pub const MOST_STEPS: u32 = 10_000;
 const STEPS: f64 = MOST_STEPS as f64;

@@ -1,10 +1,10 @@
 //! Settings of the scene, the planner and the simulation.
 
-use super::check::MOST_OBSTACLES;
+use super::ranges::MOST_OBSTACLES;
 use super::ranges::Range;
 use crate::scene::{Obstacle, Scene};
 use crate::state::{Context, Pose};
-use crate::tasks::Task;
+use crate::task::Task;
 use rand::{Rng, RngExt};
 use serde::{Deserialize, Serialize};
 use toml::Value;

@@ -6,6 +6,7 @@
 pub mod atomic;
 mod budget;
 mod bytes;
+mod content_hash;
 pub mod dataset;
 mod inspect;
 pub mod json_file;
@@ -23,5 +24,6 @@ pub mod table_file;
 mod thrift;
 pub mod weights;
 
+pub use content_hash::ContentHash;
 pub use inspect::{inspect, inspect_text};
-pub use provenance::{ContentHash, Provenance};
+pub use provenance::Provenance;

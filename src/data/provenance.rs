@@ -1,15 +1,13 @@
 //! Where an artefact came from. The same inputs give the same words: no times, no machine, no absolute paths.
 
-use super::seal;
+use super::content_hash::ContentHash;
+use super::seal::{self, SCHEMA_VERSION};
 use crate::error::{Error, Result};
-use crate::tasks::Task;
+use crate::task::Task;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
-use std::fmt;
 use std::path::Path;
 
-/// Version of the layout of all artefacts. It grows when a reader of the old layout would fail.
-pub const SCHEMA_VERSION: u32 = 1;
 /// The metadata key of every format that holds the provenance.
 pub const KEY: &str = "hilt";
 
@@ -76,33 +74,5 @@ impl Provenance {
             Some(version) if version != u64::from(SCHEMA_VERSION) => Err(seal::wrong_version(path, version)),
             _ => serde_json::from_value(value).map_err(|e| Error::input(path, format!("its provenance cannot be read: {e}"))),
         }
-    }
-}
-
-/// What names bytes, wherever they are: their BLAKE3 hash, hexadecimal as text.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct ContentHash(pub(super) blake3::Hash);
-
-impl ContentHash {
-    /// Of the bytes of a file.
-    pub fn of(bytes: &[u8]) -> Self {
-        ContentHash(blake3::hash(bytes))
-    }
-
-    /// Of a directory: its files' names, relative to it and sorted, each with the hash of its content.
-    pub fn of_directory<'a>(files: impl IntoIterator<Item = (&'a str, ContentHash)>) -> Self {
-        let files: BTreeMap<&str, ContentHash> = files.into_iter().collect();
-        let mut hash = blake3::Hasher::new();
-        for (name, content) in files {
-            hash.update(&(name.len() as u64).to_le_bytes()).update(name.as_bytes());
-            hash.update(content.0.as_bytes());
-        }
-        ContentHash(hash.finalize())
-    }
-}
-
-impl fmt::Display for ContentHash {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(self.0.to_hex().as_str())
     }
 }

@@ -1,7 +1,7 @@
 //! A seal: the BLAKE3 hash of a file, kept inside that file. It is computed over all bytes with the 64 digits of the hash itself
 //! set to zero, so any changed bit is found before a decoder sees the file.
 
-use super::provenance::{ContentHash, SCHEMA_VERSION};
+use super::content_hash::ContentHash;
 use crate::error::{Error, Result};
 use std::fs::File;
 use std::io::{self, ErrorKind};
@@ -9,6 +9,8 @@ use std::ops::Range;
 use std::os::unix::fs::FileExt;
 use std::path::Path;
 
+/// Version of the layout of all artefacts. It grows when a reader of the old layout would fail.
+pub const SCHEMA_VERSION: u32 = 1;
 /// What stands before the 64 hexadecimal digits.
 const MARK: &str = "hilt-seal-blake3:";
 /// Hexadecimal digits of a BLAKE3 hash.

@@ -3,7 +3,7 @@
 use super::Trial;
 use crate::scene::Scene;
 use crate::table::{Table, Values};
-use crate::tasks::Task;
+use crate::task::Task;
 
 /// One row per episode: where it started, how it ended, which conditions held at its end.
 pub fn to_table(task: Task, trials: &[Trial]) -> Table {

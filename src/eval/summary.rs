@@ -1,7 +1,7 @@
 //! What an evaluation comes to, in the fields that scripts read.
 
 use super::{Trial, wilson_95};
-use crate::tasks::{FailureClass, Task};
+use crate::task::{FailureClass, Task};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 

@@ -3,7 +3,7 @@
 use super::grasp::{CARRY_RISE_M, LIFTED_CENTER_M, PREGRASP_RISE_M, RETREAT_RISE_M, grasps, raised, ready, releases};
 use super::path::{Knot, tool_pose};
 use super::smooth::Limits;
-use super::transit::{Leg, smooth_path};
+use super::transit::{Leg, Motions, smooth_path};
 use super::world::{Block, PATH_CLEARANCES_M, World};
 use super::{CLOSED_RAD, Plan, PlanError, Waypoint};
 use crate::config::PlanSettings;
@@ -13,7 +13,6 @@ use crate::robot::jaco::PRESHAPE_RAD;
 use crate::robot::{Ik, READY_Q_RAD};
 use crate::scene::Scene;
 use crate::state::{ARM_JOINTS, CONTROL_DT_S, Context, JOINTS};
-use crate::tasks::REACH_M;
 use nalgebra::Isometry3;
 use rand::Rng;
 
@@ -22,10 +21,7 @@ const FINGER_SAMPLES: usize = 10;
 
 /// Makes plans; keeps its arm and its programs between them, which leave no trace in the results.
 pub struct Planner {
-    pub(super) settings: PlanSettings,
-    pub(super) limits: Limits,
-    pub(super) ik: Ik,
-    pub(super) interrupt: Interrupt,
+    motions: Motions,
     /// See [`closing`].
     closing: Vec<f64>,
 }
@@ -36,12 +32,12 @@ impl Planner {
         let limits = Limits::new(settings);
         let interrupt = Interrupt::default();
         let closing = closing(&limits, &interrupt);
-        Planner { settings: settings.clone(), limits, ik: Ik::new(), interrupt, closing }
+        Planner { motions: Motions { settings: settings.clone(), limits, ik: Ik::new(), interrupt }, closing }
     }
 
     /// Lets Ctrl-C end the planning of a scene: a plan that was on its way is an error then.
     pub fn with_interrupt(self, interrupt: &Interrupt) -> Self {
-        Planner { interrupt: interrupt.clone(), ..self }
+        Planner { motions: Motions { interrupt: interrupt.clone(), ..self.motions }, ..self }
     }
 
     /// Plans one demonstration of `scene`; `index` goes into the plan, `rng` is used only where a search is needed.
@@ -58,7 +54,7 @@ impl Planner {
                     Err(error) if farthest.as_ref().is_none_or(|f| error.progress() >= f.progress()) => farthest = Some(error),
                     Err(_) => {}
                 }
-                if self.interrupt.is_raised() {
+                if self.motions.interrupt.is_raised() {
                     return Err(PlanError::Transit("interrupted".into()));
                 }
             }
@@ -89,8 +85,8 @@ impl Planner {
     fn approach(&mut self, with: &Try, rng: &mut impl Rng) -> Result<Vec<Piece>, PlanError> {
         let (block, grasp) = (Block::Free(with.scene.block.isometry()), with.grasp);
         let above = raised(&grasp, PREGRASP_RISE_M);
-        let q_above = self.reach(&above, &READY_Q_RAD, "above the block")?;
-        let q = self.reach(&grasp, &q_above, "at the block")?;
+        let q_above = self.motions.reach(&above, &READY_Q_RAD, "above the block")?;
+        let q = self.motions.reach(&grasp, &q_above, "at the block")?;
         with.world
             .check(&q, &block, with.margin_m)
             .map_err(|why| PlanError::Grasp(format!("with the open hand around the block, {why}")))?;
@@ -105,7 +101,7 @@ impl Planner {
             margin_m: with.margin_m,
             start,
         };
-        let q = self.transit(with.world, &leg, rng)?;
+        let q = self.motions.transit(with.world, &leg, rng)?;
         let closing = Self::fingers(Phase::Close, &self.closing, &q[q.len() - 1]);
         Ok(vec![Piece { phase: Phase::Approach, q }, closing])
     }
@@ -114,7 +110,7 @@ impl Planner {
     fn lift(&mut self, with: &Try, mut pieces: Vec<Piece>, rng: &mut impl Rng) -> Result<Vec<Piece>, PlanError> {
         let lifted = raised(&with.grasp, LIFTED_CENTER_M - with.scene.block.position_m[2]);
         let leg = with.straight_up(Phase::Carry, with.grasp, lifted, Block::Held(with.in_tool()), end_of(&pieces));
-        pieces.push(Piece { phase: Phase::Carry, q: self.transit(with.world, &leg, rng)? });
+        pieces.push(Piece { phase: Phase::Carry, q: self.motions.transit(with.world, &leg, rng)? });
         Ok(pieces)
     }
 
@@ -123,8 +119,8 @@ impl Planner {
         let (block, start, grasp) = (Block::Held(with.in_tool()), end_of(&pieces), with.grasp);
         let height = grasp.z.max(release.z) + CARRY_RISE_M;
         let (from, to) = (raised(&grasp, height - grasp.z), raised(release, height - release.z));
-        let q_above = self.reach(&to, &start, "above the target")?;
-        let mut q = self.reach(release, &q_above, "at the target")?;
+        let q_above = self.motions.reach(&to, &start, "above the target")?;
+        let mut q = self.motions.reach(release, &q_above, "at the target")?;
         let placed = Block::Free(tool_pose(release) * with.in_tool());
         let at_target = |why| PlanError::Grasp(format!("with the block at its target, {why}"));
         with.world.check(&q, &block, with.margin_m).map_err(at_target)?;
@@ -132,23 +128,12 @@ impl Planner {
         with.world.check(&q, &placed, with.margin_m).map_err(at_target)?;
         let (before, after) = (vec![grasp], vec![*release]);
         let leg = Leg { phase: Phase::Carry, before, from, to, after, block, margin_m: with.margin_m, start };
-        pieces.push(Piece { phase: Phase::Carry, q: self.transit(with.world, &leg, rng)? });
+        pieces.push(Piece { phase: Phase::Carry, q: self.motions.transit(with.world, &leg, rng)? });
         let opening: Vec<f64> = self.closing.iter().rev().copied().collect();
         pieces.push(Self::fingers(Phase::Open, &opening, &end_of(&pieces)));
         let leg = with.straight_up(Phase::Retreat, *release, raised(release, RETREAT_RISE_M), placed, end_of(&pieces));
-        pieces.push(Piece { phase: Phase::Retreat, q: self.transit(with.world, &leg, rng)? });
+        pieces.push(Piece { phase: Phase::Retreat, q: self.motions.transit(with.world, &leg, rng)? });
         Ok(pieces)
-    }
-
-    /// Joint angles at a hand pose, by way of `seed`.
-    pub(super) fn reach(&mut self, knot: &Knot, seed: &[f64; JOINTS], place: &str) -> Result<[f64; JOINTS], PlanError> {
-        let [near, far] = REACH_M;
-        self.ik.solve(&tool_pose(knot), seed).map_err(|why| {
-            PlanError::Grasp(format!(
-                "the level hand cannot reach {place}: {why}; it reaches {near} m to {far} m around the base, set the spawn area \
-                 (scene.spawn_x_m, scene.spawn_y_m) and scene.base_xy_m within"
-            ))
-        })
     }
 
     /// Fingers follow `angles`, the arm still.

@@ -1,16 +1,18 @@
 //! A motion between two hand poses: straight if that is free, higher if that is, searched otherwise; then timed, smoothed and checked.
 
+use super::PlanError;
 use super::grasp::raised;
-use super::path::{Knot, follow};
+use super::path::{Knot, follow, tool_pose};
 use super::search::Search;
 use super::smooth::{Limits, smooth};
 use super::timing::time;
 use super::world::{Block, CLEARANCE_M, World};
-use super::{PlanError, Planner};
-use crate::config::MOST_STEPS;
+use crate::config::{MOST_STEPS, PlanSettings};
 use crate::demo::Phase;
 use crate::interrupt::Interrupt;
+use crate::robot::Ik;
 use crate::state::JOINTS;
+use crate::tasks::REACH_M;
 use rand::Rng;
 
 /// Corners are rounded this far before and behind \[m\]; the narrower one where the wider would touch something.
@@ -54,7 +56,15 @@ impl Leg {
     }
 }
 
-impl Planner {
+/// Makes motions; keeps its programs between them, which leave no trace in the results.
+pub(super) struct Motions {
+    pub(super) settings: PlanSettings,
+    pub(super) limits: Limits,
+    pub(super) ik: Ik,
+    pub(super) interrupt: Interrupt,
+}
+
+impl Motions {
     /// Samples of the motion at the control rate.
     pub(super) fn transit(&mut self, world: &World, leg: &Leg, rng: &mut impl Rng) -> Result<Vec<[f64; JOINTS]>, PlanError> {
         let straight = match self.try_way(world, leg, &leg.higher(0.0)) {
@@ -104,6 +114,17 @@ impl Planner {
         let samples = smooth_path(&path, &self.limits, &self.interrupt).map_err(smoothing)?;
         clear(world, &samples, &leg.block, CLEARANCE_M).map_err(smoothing)?;
         Ok(samples)
+    }
+
+    /// Joint angles at a hand pose, by way of `seed`.
+    pub(super) fn reach(&mut self, knot: &Knot, seed: &[f64; JOINTS], place: &str) -> Result<[f64; JOINTS], PlanError> {
+        let [near, far] = REACH_M;
+        self.ik.solve(&tool_pose(knot), seed).map_err(|why| {
+            PlanError::Grasp(format!(
+                "the level hand cannot reach {place}: {why}; it reaches {near} m to {far} m around the base, set the spawn area \
+                 (scene.spawn_x_m, scene.spawn_y_m) and scene.base_xy_m within"
+            ))
+        })
     }
 
     fn search(&mut self, world: &World, leg: &Leg, rng: &mut impl Rng) -> Result<Vec<Knot>, String> {

@@ -1,59 +1,23 @@
 //! Watches an episode: conditions by name, milestones of the reward, success, and the class of a failure.
 
-use super::{FailureClass, Task, pick_and_place, pick_up, stack};
-use crate::demo::Contacts;
+use super::observation::Observation;
+use super::{pick_and_place, pick_up, stack};
 use crate::math::cos;
 use crate::scene::{BLOCK_EDGE_M, Scene};
-use crate::state::{CONTROL_HZ, Pose, State};
+use crate::state::CONTROL_HZ;
+use crate::task::{FailureClass, Task};
 use nalgebra::Vector3;
 
 /// Steps that all goal conditions must hold without a break: 0.5 s.
 pub const HOLD_STEPS: u32 = CONTROL_HZ / 2;
 /// The hand has approached when its tool point is this near to the block's centre \[m\].
 const REACH_M: f64 = 0.05;
-/// A finger presses when its normal force on the block exceeds this \[N\]; the block weighs about 1 N.
-const PRESS_N: f64 = 0.05;
 /// The block has left the table when its centre is this high \[m\] (2 cm above its resting height).
 const OFF_TABLE_M: f64 = BLOCK_EDGE_M / 2.0 + 0.02;
-/// At rest below this speed \[m/s\].
-pub(super) const REST_SPEED_M_S: f64 = 0.01;
 /// A block that leans more than this has toppled \[rad\] (30 degrees).
 const TOPPLE_RAD: f64 = std::f64::consts::FRAC_PI_6;
 /// The base block counts as pushed away beyond this \[m\]: half an edge.
 const BASE_PUSHED_M: f64 = BLOCK_EDGE_M / 2.0;
-
-/// What the simulator shows of one moment.
-#[derive(Clone, Debug)]
-pub struct Observation {
-    /// s_t.
-    pub state: State,
-    /// Tool point in the world \[m\].
-    pub tool_m: [f64; 3],
-    /// Pose of the base block now, if there is one.
-    pub base_now: Option<Pose>,
-    /// Contacts now.
-    pub contacts: Contacts,
-    /// Speed of the block's centre \[m/s\].
-    pub block_speed_m_s: f64,
-}
-
-impl Observation {
-    /// Distance of the block's centre to `target` \[m\].
-    pub fn block_to(&self, target_m: [f64; 3]) -> f64 {
-        (Vector3::from(self.state.block.position_m) - Vector3::from(target_m)).norm()
-    }
-
-    /// Whether no finger touches the block.
-    pub fn released(&self) -> bool {
-        self.contacts.finger_block_n.iter().all(|f| *f <= 0.0)
-    }
-
-    /// Whether the thumb (finger 1) and one of its opposites press the block.
-    pub fn gripped(&self) -> bool {
-        let [thumb, left, right] = self.contacts.finger_block_n.map(|f| f > PRESS_N);
-        thumb && (left || right)
-    }
-}
 
 /// The monitor's word on one moment.
 #[derive(Clone, Debug, PartialEq)]

@@ -1,7 +1,7 @@
 //! Pick-and-place. Task: carry the block to a goal on the table. Randomisation: block and goal, at least 10 cm apart.
 //! Success: lifted on the way, then within 5 cm of the goal, released, on the table and at rest for 0.5 s.
 
-use super::monitor::{Observation, REST_SPEED_M_S};
+use super::observation::{Observation, REST_SPEED_M_S};
 
 /// Distance of the block's final position to the goal that counts \[m\] (paper 4.1).
 pub const GOAL_TOLERANCE_M: f64 = 0.05;

@@ -1,7 +1,7 @@
 //! Pick-up. Task: lift the block to 20 cm. Randomisation: where the block stands. Success: at height and gripped for 0.5 s
 //! (a throw is no success).
 
-use super::monitor::Observation;
+use super::observation::Observation;
 
 /// Height of the block's centre above the table that counts \[m\] (paper 4.1).
 pub const TARGET_HEIGHT_M: f64 = 0.20;

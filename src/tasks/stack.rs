@@ -1,7 +1,7 @@
 //! Stack. Task: put the block on the base block. Randomisation: where the block stands; the base block is fixed.
 //! Success: resting on the base block alone, released by all fingers and at rest for 0.5 s.
 
-use super::monitor::{Observation, REST_SPEED_M_S};
+use super::observation::{Observation, REST_SPEED_M_S};
 use crate::math::hypot;
 use crate::scene::BLOCK_EDGE_M;
 

@@ -1,8 +1,9 @@
 //! Directories that take their place whole: filled beside it, exchanged in one step.
 
+use super::disk::{parent_of, sync_directory};
 use super::target::follow;
 use super::temporary::{self, Directory};
-use super::{FileKind, kind_of_name, parent_of, sync_directory};
+use crate::data::litter::{FileKind, kind_of_name};
 use crate::error::{Error, Result};
 use rustix::fs::{AtFlags, CWD, RenameFlags, StatxAttributes, StatxFlags, renameat_with, statx};
 use rustix::io::Errno;

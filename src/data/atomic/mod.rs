@@ -3,6 +3,7 @@
 //! and what is no regular file (a device, a pipe) is written into.
 
 mod directory;
+mod disk;
 mod pieces;
 mod target;
 mod temporary;
@@ -12,9 +13,9 @@ pub use pieces::{Workplace, link, write_piece};
 pub use target::{Target, follow, target};
 pub(super) use temporary::is_temporary;
 
-use super::litter::{FileKind, kind_of_name};
 use crate::error::{Error, Result};
 use crate::interrupt;
+use disk::{parent_of, sync_directory};
 use rustix::fs::OFlags;
 use rustix::io::Errno;
 use std::fs::{self, File};
@@ -162,21 +163,6 @@ fn check_above(path: &Path, place: &Path) -> Result<()> {
     let nearest = place.ancestors().skip(1).find(|p| p.exists()).unwrap_or(Path::new("/"));
     temporary::sweep(nearest);
     temporary::file(nearest, path).map(drop)
-}
-
-/// The existing directory above `path`.
-fn parent_of(path: &Path) -> Result<&Path> {
-    let parent = match path.parent() {
-        Some(p) if !p.as_os_str().is_empty() => p,
-        _ => Path::new("."),
-    };
-    fs::create_dir_all(parent).map_err(|e| Error::io(parent, "create", e))?;
-    Ok(parent)
-}
-
-/// Makes renames within a directory last. Some file systems cannot; their renames last as long as they do.
-fn sync_directory(dir: &Path) {
-    let _ = File::open(dir).and_then(|handle| handle.sync_all());
 }
 
 #[cfg(test)]

@@ -6,7 +6,7 @@ use crate::data::bytes::Format;
 use crate::data::{ContentHash, Provenance, json_file, provenance, seal};
 use crate::error::{Error, Result};
 use crate::state::CONTROL_HZ;
-use crate::tasks::Task;
+use crate::task::Task;
 use serde::Deserialize;
 use serde_json::Value;
 use std::collections::BTreeMap;

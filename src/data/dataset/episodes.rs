@@ -3,11 +3,11 @@
 use super::features::Feature;
 use super::files::{Encoder, Place, Series};
 use super::meta::EPISODES;
+use super::sizes::Sizes;
 use super::stats::{NAMES, Stats};
-use super::write::Sizes;
 use crate::data::{Provenance, parquet_file};
 use crate::error::Result;
-use crate::tasks::Task;
+use crate::task::Task;
 use arrow_array::{Array, ArrayRef, Float64Array, Int64Array, ListArray, StringArray};
 use arrow_buffer::OffsetBuffer;
 use arrow_schema::{Field, Schema};

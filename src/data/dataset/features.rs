@@ -1,8 +1,8 @@
 //! The columns of a dataset: names, shapes, and how an episode fills them.
 
-use super::DatasetEpisode;
+use super::episode::DatasetEpisode;
 use crate::state::{CONTROL_HZ, JOINTS, State, action_names};
-use crate::tasks::Task;
+use crate::task::Task;
 use arrow_array::{ArrayRef, BooleanArray, FixedSizeListArray, Float32Array, Int64Array};
 use arrow_schema::{DataType, Field, Metadata};
 use std::sync::Arc;

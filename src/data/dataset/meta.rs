@@ -6,7 +6,7 @@ use super::stats::{NAMES, Stats};
 use crate::data::{Provenance, atomic, parquet_file, seal};
 use crate::error::Result;
 use crate::state::CONTROL_HZ;
-use crate::tasks::Task;
+use crate::task::Task;
 use arrow_array::{ArrayRef, Int64Array, RecordBatch, StringArray};
 use arrow_schema::{Field, Metadata, Schema};
 use parquet::errors::ParquetError;

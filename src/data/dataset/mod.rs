@@ -6,6 +6,7 @@
 //! validation episodes enters a normalisation. `meta/info.json` lists the content hash of every other file and seals itself.
 
 mod check;
+mod episode;
 mod episodes;
 mod features;
 mod files;
@@ -13,22 +14,22 @@ mod meta;
 mod read;
 mod rows;
 mod scratch;
+mod sizes;
 mod split;
 mod stats;
 mod twins;
 mod whole;
 mod write;
 
+pub use episode::{DatasetEpisode, Episodes};
 pub use read::{Dataset, Description, each, read, read_for};
 pub use split::split;
 pub use twins::{Fingerprint, first_shared, first_twins};
 
 use super::{Provenance, atomic};
-use crate::demo::{Demo, Episode};
 use crate::error::Result;
 use crate::interrupt::Interrupt;
-use crate::tasks::Task;
-use std::borrow::Cow;
+use crate::task::Task;
 use std::path::Path;
 use write::Content;
 
@@ -36,62 +37,6 @@ use write::Content;
 pub const TRAIN: &str = "train";
 /// Folder of the validation root.
 pub const VALIDATION: &str = "validation";
-
-/// A demo and what the dataset keeps beside it.
-#[derive(Clone, Debug)]
-pub struct DatasetEpisode {
-    /// Number of the episode in the recordings.
-    pub source_index: u64,
-    /// States and actions.
-    pub demo: Demo,
-    /// r_t of each of the T actions: milestones reached by it.
-    pub rewards: Vec<f32>,
-    /// Whether the task is solved at the end.
-    pub success: bool,
-}
-
-impl DatasetEpisode {
-    /// Of a recorded episode and its demo. A recording notes a reward with the state that earns it; here it belongs to the
-    /// action that led there.
-    pub fn of(episode: &Episode, demo: Demo) -> Self {
-        let arrived = episode.steps.iter().skip(1).chain([&episode.last]);
-        DatasetEpisode {
-            source_index: episode.index,
-            demo,
-            rewards: arrived.map(|s| s.reward as f32).collect(),
-            success: episode.success,
-        }
-    }
-
-    /// Bytes of its numbers.
-    pub fn bytes(&self) -> usize {
-        let numbers = [self.demo.states(), self.demo.actions(), self.demo.executed(), &self.rewards];
-        numbers.iter().map(|n| size_of_val(*n)).sum()
-    }
-}
-
-/// What gives the episode at a position.
-type Give<'a> = Box<dyn Fn(usize) -> Result<Cow<'a, DatasetEpisode>> + Sync + 'a>;
-
-/// The episodes that a dataset is made of, each asked for once, on any thread, when its turn comes.
-pub struct Episodes<'a> {
-    /// T of each.
-    steps: Vec<usize>,
-    give: Give<'a>,
-}
-
-impl<'a> Episodes<'a> {
-    /// Episodes of so many `steps`; `give` has the one at a position.
-    pub fn new(steps: Vec<usize>, give: impl Fn(usize) -> Result<Cow<'a, DatasetEpisode>> + Sync + 'a) -> Self {
-        Episodes { steps, give: Box::new(give) }
-    }
-}
-
-impl<'a> From<&'a [DatasetEpisode]> for Episodes<'a> {
-    fn from(all: &'a [DatasetEpisode]) -> Self {
-        Episodes::new(all.iter().map(|episode| episode.demo.len()).collect(), |at| Ok(Cow::Borrowed(&all[at])))
-    }
-}
 
 /// Writes one dataset; an older one there is replaced when the new one is whole.
 ///

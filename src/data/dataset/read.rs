@@ -7,7 +7,7 @@ use super::rows::Rows;
 use crate::data::{ContentHash, Provenance, parquet_file};
 use crate::demo::Demo;
 use crate::error::{Error, Result};
-use crate::tasks::Task;
+use crate::task::Task;
 use std::collections::BTreeMap;
 use std::path::Path;
 

@@ -10,7 +10,7 @@ use crate::data::parquet_file;
 use crate::demo::Demo;
 use crate::error::{Error, Result};
 use crate::state::JOINTS;
-use crate::tasks::Task;
+use crate::task::Task;
 use arrow_array::cast::AsArray;
 use arrow_array::types::{Float32Type, Int64Type};
 use arrow_array::{Array, RecordBatch};

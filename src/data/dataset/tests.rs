@@ -1,9 +1,11 @@
 //! Datasets of many windows, row groups and files.
 
-use super::write::Sizes;
+use super::sizes::Sizes;
 use super::*;
+use crate::demo::Demo;
 use crate::error::Error;
 use crate::state::JOINTS;
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::fs;
 

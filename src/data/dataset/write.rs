@@ -1,37 +1,22 @@
 //! Writing a dataset: windows of episodes become row groups on all threads and are appended in their order.
 
+use super::episode::{DatasetEpisode, Episodes};
 use super::episodes::{EpisodeTable, Row};
 use super::features::{self, Cells, Feature, features};
 use super::files::{Encoder, RowGroup, Series};
-use super::meta::{self, DATA, DATA_FILE_MB};
+use super::meta::{self, DATA};
+use super::sizes::Sizes;
 use super::stats::stats;
 use super::whole::Whole;
-use super::{DatasetEpisode, Episodes};
 use crate::data::{Provenance, parquet_file};
 use crate::error::{Error, Result};
 use crate::interrupt::Interrupt;
-use crate::tasks::Task;
+use crate::task::Task;
 use arrow_schema::Schema;
 use parquet::errors::ParquetError;
 use rayon::prelude::*;
 use std::fs;
 use std::path::Path;
-
-/// How a dataset is cut.
-#[derive(Clone, Copy)]
-pub(super) struct Sizes {
-    /// A file is closed once it is this big \[bytes\].
-    pub(super) file_bytes: usize,
-    /// Frames that are in memory at once, but for an episode that has more.
-    pub(super) window_frames: usize,
-    /// Episodes of a row group of the table of episodes.
-    pub(super) table_rows: usize,
-}
-
-impl Sizes {
-    /// Of all datasets: LeRobot's own 100 MB; some 180 pick-ups, which take 15 MB with all that is made of them; rows that take 20 kB each.
-    const USUAL: Sizes = Sizes { file_bytes: DATA_FILE_MB * 1_000_000, window_frames: 1 << 14, table_rows: 1000 };
-}
 
 /// What the datasets of one call share.
 pub(super) struct Content<'a> {

@@ -1,6 +1,6 @@
 //! A dataset, described in the memory of one of its files.
 
-use super::answer;
+use super::answer::answer;
 use super::statistics::{Columns, statistics};
 use crate::data::dataset;
 use crate::error::{Error, Result};

@@ -1,5 +1,6 @@
 //! What any artefact is: kind, provenance, shapes, counts, statistics; as JSON and as words.
 
+mod answer;
 mod datasets;
 mod recordings;
 mod statistics;
@@ -10,9 +11,10 @@ pub use text::inspect_text;
 
 use super::dataset::{TRAIN, VALIDATION};
 use super::peek::{Format, format_of};
-use super::{Provenance, bytes, json_file, recording, weights};
+use super::{bytes, json_file, weights};
 use crate::error::{Error, Result};
 use crate::interrupt::Interrupt;
+use answer::answer;
 use serde_json::{Map, Value, json};
 use statistics::statistics;
 use std::path::Path;
@@ -81,15 +83,6 @@ fn directory(path: &Path, interrupt: &Interrupt) -> Result<Value> {
         return Err(Error::input(path, message));
     }
     recordings::all(path, interrupt)
-}
-
-/// The first fields of every answer.
-fn answer(kind: &str, provenance: &Provenance, rest: Value) -> Value {
-    let mut fields = Map::from_iter([("kind".to_string(), json!(kind)), ("provenance".to_string(), json!(provenance))]);
-    if let Value::Object(rest) = rest {
-        fields.extend(rest);
-    }
-    Value::Object(fields)
 }
 
 fn network(path: &Path) -> Result<Value> {

@@ -1,13 +1,13 @@
 //! One recording, and a directory of them.
 
+use super::answer::answer;
 use super::statistics::{by_entry, statistics};
-use super::{Provenance, answer, recording};
-use crate::data::ContentHash;
+use crate::data::{ContentHash, Provenance, recording};
 use crate::demo::{Episode, Phase, Step};
 use crate::error::{Error, Result};
 use crate::interrupt::Interrupt;
 use crate::state::{CONTROL_DT_S, State, action_names};
-use crate::tasks::FailureClass;
+use crate::task::FailureClass;
 use rayon::prelude::*;
 use serde_json::{Map, Value, json};
 use std::collections::BTreeMap;

@@ -1,6 +1,6 @@
 //! A table, described in the memory of some thousand of its rows.
 
-use super::answer;
+use super::answer::answer;
 use super::statistics::Running;
 use crate::data::table_file::{self, Reader};
 use crate::error::Result;

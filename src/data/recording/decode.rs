@@ -1,13 +1,13 @@
 //! From the messages of `proto/hilt.proto` back to an episode. Every error says which message and field.
 
+use super::topics::{OUTCOME_TOPIC, SCENE_TOPIC, STEP_TOPIC};
 use super::walk::Outline;
-use super::{OUTCOME_TOPIC, SCENE_TOPIC, STEP_TOPIC};
 use crate::config::{self, check_scene};
 use crate::data::proto;
 use crate::demo::{Contacts, Episode, Phase, Step};
 use crate::scene::{Obstacle, Scene};
 use crate::state::{Context, Pose, State};
-use crate::tasks::{FailureClass, Task};
+use crate::task::{FailureClass, Task};
 use prost::Message;
 use std::mem::discriminant;
 

@@ -4,7 +4,7 @@ use crate::data::proto;
 use crate::demo::{Contacts, Episode, Phase, Step};
 use crate::scene::{Obstacle, Scene};
 use crate::state::{Context, Pose};
-use crate::tasks::{FailureClass, Task};
+use crate::task::{FailureClass, Task};
 
 pub(super) fn step(step: &Step, task: Task, number: usize, final_state: bool) -> proto::Step {
     let conditions = task.condition_names().iter().zip(&step.conditions);

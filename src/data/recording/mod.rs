@@ -17,6 +17,7 @@ mod encode;
 mod fields;
 mod foxglove;
 mod records;
+mod topics;
 mod walk;
 
 pub use foxglove::{BASE_FRAME, BLOCK_FRAME, WORLD_FRAME};
@@ -40,6 +41,7 @@ use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::io::Cursor;
 use std::path::{Path, PathBuf};
+use topics::{OUTCOME_TOPIC, SCENE_TOPIC, STEP_TOPIC};
 use walk::Outline;
 
 /// Duration of a control step on the clock of the file \[ns\].
@@ -50,10 +52,6 @@ pub const URDF_NAME: &str = "robot.urdf";
 const PROVENANCE: &str = "provenance";
 /// Key of the seal in the metadata record.
 const SEAL: &str = "seal";
-
-const SCENE_TOPIC: &str = "/hilt/scene";
-const STEP_TOPIC: &str = "/hilt/step";
-const OUTCOME_TOPIC: &str = "/hilt/outcome";
 
 /// Name of an episode's file, e.g. `episode-00042.mcap`.
 pub fn file_name(index: u64) -> String {

@@ -2,7 +2,7 @@
 
 mod acted;
 pub mod behavior_cloning;
-mod model_loss;
+pub mod model_loss;
 mod policy_loss;
 mod regression;
 pub(in crate::learn) mod shards;

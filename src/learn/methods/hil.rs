@@ -362,7 +362,7 @@ impl Method for Hil {
         self.descent.end_stage();
     }
 
-    fn policy(&self) -> &Policy {
+    fn candidate(&self) -> &Policy {
         &self.descent.averaged
     }
 

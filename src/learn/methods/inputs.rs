@@ -3,7 +3,7 @@
 use crate::demo::Demo;
 use crate::error::{Error, Result};
 use crate::learn::models::Corpus;
-use crate::tasks::Task;
+use crate::task::Task;
 use std::borrow::Cow;
 
 /// Training and validation demos of one task.

@@ -2,15 +2,15 @@
 
 mod batches;
 mod cost;
-mod descent;
-mod fine_tuning;
-mod hil;
+pub mod descent;
+pub mod fine_tuning;
+pub mod hil;
 mod hil_metrics;
 mod inputs;
-mod mixing;
+pub mod mixing;
 mod optimizer;
 mod patience;
-mod pretrain_dynamics;
+pub mod pretrain_dynamics;
 mod validation;
 
 pub use hil::{Hil, Update};

@@ -7,7 +7,7 @@ use crate::demo::{Demo, LARGEST_NUMBER};
 use crate::error::{Error, Result};
 use crate::nn::{LANES, Lanes, Panels, kernel};
 use crate::state::{BASE_DIM, JOINTS};
-use crate::tasks::Task;
+use crate::task::Task;
 use std::array::from_fn;
 use std::borrow::Cow;
 use std::iter::repeat_n;

@@ -7,7 +7,7 @@ use super::weights::{Reader, push_features, push_network, push_scaling};
 use crate::config::{PretrainSettings, Structure};
 use crate::nn::{Lanes, Mlp, Pass};
 use crate::state::{Action, BASE_DIM, CONTROL_DT_S, JOINTS};
-use crate::tasks::Task;
+use crate::task::Task;
 use crate::tensor::NamedTensor;
 use rand::Rng;
 use serde_json::{Value, json};

@@ -7,7 +7,7 @@ use super::scaling::Scaling;
 use crate::config::FeatureSet;
 use crate::nn::{LANES, Lanes, Panels, kernel, panels_of};
 use crate::state::{BASE_DIM, JOINTS, MOST_CONTEXT};
-use crate::tasks::Task;
+use crate::task::Task;
 use std::array::from_fn;
 
 /// Spread below which a state entry counts as constant (1 cm, 0.01 rad, 0.01 rad/s, 0.01 of a quaternion).

@@ -9,7 +9,7 @@ use crate::math::{exp_f32, ln};
 use crate::nn::{Lanes, Mlp, Pass};
 use crate::seed::normal;
 use crate::state::JOINTS;
-use crate::tasks::Task;
+use crate::task::Task;
 use crate::tensor::NamedTensor;
 use rand::Rng;
 use serde_json::{Value, json};

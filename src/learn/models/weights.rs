@@ -6,7 +6,7 @@ use super::scaling::Scaling;
 use crate::config::{FeatureSet, MOST_LAYERS, MOST_UNITS};
 use crate::nn::{Activation, Mlp};
 use crate::state::JOINTS;
-use crate::tasks::Task;
+use crate::task::Task;
 use crate::tensor::NamedTensor;
 use crate::words::shown;
 use serde::de::DeserializeOwned;
@@ -88,7 +88,7 @@ impl Reader<'_> {
         }
     }
 
-    /// What [`push_scaling`] wrote; refuses a standard deviation that is not positive.
+    /// What `push_scaling` wrote; refuses a standard deviation that is not positive.
     pub fn scaling(&self, name: &str, width: usize) -> Result<Scaling, String> {
         let mean = self.tensor(&format!("{name}.mean"), &[width])?;
         let std = self.tensor(&format!("{name}.std"), &[width])?;
@@ -107,7 +107,7 @@ impl Reader<'_> {
         }
     }
 
-    /// What [`push_features`] wrote.
+    /// What `push_features` wrote.
     pub fn features(&self, name: &str, task: Task) -> Result<Features, String> {
         let set: FeatureSet = self.meta("features")?;
         let state = self.scaling(&format!("{name}.state"), task.state_dim())?;
@@ -115,7 +115,7 @@ impl Reader<'_> {
         Ok(Features::from_scaling(task, set, self.meta("mask_dq")?, state, derived))
     }
 
-    /// What [`push_network`] wrote, for a network with these inputs and outputs.
+    /// What `push_network` wrote, for a network with these inputs and outputs.
     pub fn network(&self, name: &str, inputs: usize, outputs: usize) -> Result<Mlp, String> {
         let activation: Activation = self.meta("activation")?;
         let hidden: Vec<usize> = self.meta("hidden")?;

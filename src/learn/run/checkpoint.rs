@@ -1,10 +1,10 @@
 //! The state of training at the end of an epoch as named arrays and a description, and back: with it training goes on as if it had
 //! never stopped. Floats of the networks are arrays; counts and metrics, which f32 cannot hold, go into the description.
 
+use super::history::History;
 use super::method::{Method, Saved};
 use super::metrics::EpochMetrics;
 use super::past;
-use super::selection::Selection;
 use crate::learn::models::{Policy, Reader};
 use crate::tensor::NamedTensor;
 use serde_json::{Value, json};
@@ -16,17 +16,6 @@ pub struct Checkpoint {
     pub tensors: Vec<NamedTensor>,
     /// All that is not an array; its entry `after` says in words where training stands.
     pub meta: Value,
-}
-
-/// What a [`Checkpoint`] says of the run, beside the method's own state.
-#[derive(Default)]
-pub struct History {
-    /// All epochs so far.
-    pub rows: Vec<EpochMetrics>,
-    /// The candidates so far.
-    pub selection: Selection,
-    /// The policy that the selection prefers.
-    pub best: Option<Policy>,
 }
 
 /// What the names of the preferred policy's tensors begin with.
@@ -63,7 +52,7 @@ impl Checkpoint {
                 Some(NamedTensor { name: name.into(), ..tensor.clone() })
             };
             let best: Vec<NamedTensor> = self.tensors.iter().filter_map(best).collect();
-            history.best = Some(Policy::from_tensors(&best, &method.policy().meta())?);
+            history.best = Some(Policy::from_tensors(&best, &method.candidate().meta())?);
         }
         Ok(history)
     }

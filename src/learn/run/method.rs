@@ -47,7 +47,7 @@ pub trait Method {
     fn end(&mut self, stage: &str);
 
     /// The policy as it would be kept now.
-    fn policy(&self) -> &Policy;
+    fn candidate(&self) -> &Policy;
 
     /// Its state between two epochs.
     fn save(&self) -> Saved;

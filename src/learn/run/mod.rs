@@ -2,6 +2,7 @@
 
 mod checkpoint;
 mod exact;
+mod history;
 mod hooks;
 mod method;
 mod metrics;
@@ -18,7 +19,7 @@ use crate::config::TrainSettings;
 use crate::error::{Error, Result};
 use crate::learn::models::{Dynamics, Policy};
 use crate::table::Table;
-use checkpoint::History;
+use history::History;
 use std::time::Instant;
 
 /// What training leaves behind.
@@ -40,7 +41,7 @@ pub struct Trained {
 /// [`Error::Failed`] for a checkpoint that does not fit; what the method and rollouts return.
 pub fn run(method: Box<dyn Method + '_>, settings: &TrainSettings, hooks: Hooks) -> Result<Trained> {
     let mut run = Run::new(method, settings, hooks)?;
-    match run.to_the_end() {
+    match run.through_the_stages() {
         Ok(()) => Ok(run.finish()),
         Err(why) => {
             run.keep_last();
@@ -76,7 +77,7 @@ impl<'a> Run<'a> {
         Ok(run)
     }
 
-    fn to_the_end(&mut self) -> Result<()> {
+    fn through_the_stages(&mut self) -> Result<()> {
         let stages = self.method.stages();
         let reached = self.history.rows.last().map(|row| (row.stage.clone(), row.epoch));
         let (mut done, mut at) = (0, 0);
@@ -118,9 +119,9 @@ impl<'a> Run<'a> {
     fn select(&mut self) -> Result<()> {
         let Some(row) = self.history.rows.last() else { return Ok(()) };
         if self.history.selection.wants(row, self.settings) {
-            let successes = (self.hooks.score)(self.method.policy())?;
+            let successes = (self.hooks.score)(self.method.candidate())?;
             if self.history.selection.offer(row, successes) {
-                self.history.best = Some(self.method.policy().clone());
+                self.history.best = Some(self.method.candidate().clone());
             }
         }
         Ok(())

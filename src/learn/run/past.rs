@@ -1,6 +1,6 @@
 //! What a checkpoint says of the past, held against what training can have made: its seal is a checksum that anybody can compute.
 
-use super::checkpoint::History;
+use super::history::History;
 use super::method::Stage;
 use super::metrics::EpochMetrics;
 

@@ -17,7 +17,7 @@ use crate::math::exp_f32;
 use crate::nn::{Activation, LANES, Lanes, Pass};
 use crate::seed::stream;
 use crate::state::{ARM_JOINTS, BASE_DIM, FINGERS, JOINTS};
-use crate::tasks::Task;
+use crate::task::Task;
 use rand::RngExt;
 
 struct World {

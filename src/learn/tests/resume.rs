@@ -6,7 +6,7 @@ use crate::error::{Error, Result};
 use crate::interrupt::Interrupt;
 use crate::learn::{Checkpoint, Dynamics, Hooks, Inputs, MethodName as Method, Policy, Trained, pretrain_dynamics, train};
 use crate::table::Values;
-use crate::tasks::Task;
+use crate::task::Task;
 use serde_json::Value;
 use std::time::Duration;
 

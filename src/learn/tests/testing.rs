@@ -4,7 +4,7 @@ use crate::demo::Demo;
 use crate::robot::READY_Q_RAD;
 use crate::seed::stream;
 use crate::state::{BASE_DIM, CONTROL_DT_S, JOINTS};
-use crate::tasks::Task;
+use crate::task::Task;
 use rand::{Rng, RngExt};
 
 fn noise(rng: &mut impl Rng, size: f32) -> f32 {

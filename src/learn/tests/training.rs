@@ -9,7 +9,7 @@ use crate::learn::methods::Hil;
 use crate::learn::{Dynamics, Hooks, Inputs, MethodName as Method, ModelReport, Policy, Trained, pretrain_dynamics, train};
 use crate::state::JOINTS;
 use crate::table::{Column, Values};
-use crate::tasks::Task;
+use crate::task::Task;
 
 fn pretrain(task: Task, epochs: u64) -> (Dynamics, ModelReport) {
     let settings = PretrainSettings { hidden_units: 24, epochs, batch_rows: 64, ..Default::default() };

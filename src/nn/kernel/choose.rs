@@ -12,7 +12,7 @@ static CHOSEN: OnceLock<Path> = OnceLock::new();
 /// Without it the fastest one that the processor has runs, found by a trial of a millisecond. To be called before the first product.
 ///
 /// # Errors
-/// [`Error::Usage`] when the value is no kernel, or one that this processor lacks.
+/// [`crate::error::Error::Usage`] when the value is no kernel, or one that this processor lacks.
 pub fn choose() -> Result<()> {
     if let Some(name) = std::env::var_os(VARIABLE) {
         let path = Path::named(&name)?;

@@ -81,7 +81,7 @@ pub fn write(image: &mut RgbImage, text: &str, color: Rgb) {
 mod tests {
     use super::*;
     use crate::demo::Phase;
-    use crate::tasks::FailureClass;
+    use crate::task::FailureClass;
 
     #[test]
     fn every_letter_of_every_label_has_a_glyph_of_its_own() {

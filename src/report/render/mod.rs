@@ -196,7 +196,7 @@ mod tests {
     use crate::demo::Contacts;
     use crate::robot::READY_Q_RAD;
     use crate::state::State;
-    use crate::tasks::Task;
+    use crate::task::Task;
     use nalgebra::Vector3;
 
     fn still(block: Pose, base: Pose) -> (Scene, Step) {

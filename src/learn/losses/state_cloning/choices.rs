@@ -89,7 +89,7 @@ impl Choices {
 mod tests {
     use super::*;
     use crate::demo::Demo;
-    use crate::tasks::Task;
+    use crate::task::Task;
 
     #[test]
     fn l_sc_teaches_fingers_that_follow_their_commands() {

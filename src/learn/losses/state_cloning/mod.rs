@@ -1,6 +1,6 @@
 //! Algorithm 3: state cloning. The policy acts in the dynamics network from a demo's first state; L_SC (Eq. 5) compares the states.
 //!
-//! The segments of all demos ([`segments`]) advance together as rows of one matrix. Sequential depth is the longest segment. The first
+//! The segments of all demos (`segments.rs`) advance together as rows of one matrix. Sequential depth is the longest segment. The first
 //! action of a segment is the policy's action in a demo state, which [`Acted`] has.
 
 mod choices;

@@ -1,0 +1,97 @@
+//! The command line as a whole: parse and dispatch.
+
+use super::console::Console;
+use super::context::{Context, Outcome};
+use super::{convert, evaluate, inspect, plan, pretrain, render, settings, simulate, train};
+use crate::error::{Error, Result};
+use crate::interrupt::Interrupt;
+use clap::{Parser, Subcommand};
+use std::path::PathBuf;
+use std::time::Instant;
+
+/// Hybrid imitation learning for robot manipulation: from a task's name to an evaluated policy.
+///
+/// The stages in order: plan, simulate, convert, pretrain, train, evaluate. Each reads files and writes files, by default under
+/// runs/TASK/. `make all TASK=stack` runs them all.
+#[derive(Debug, Parser)]
+#[command(
+    name = "hilt",
+    version,
+    max_term_width = 100,
+    after_help = "Exit codes: 0 done, 1 failed, 2 wrong usage, 3 done but episodes were dropped, 130 interrupted (143 by SIGTERM).\n\
+                  Results go to stdout, words and progress to stderr."
+)]
+pub struct Cli {
+    #[command(subcommand)]
+    command: Command,
+    /// Worker threads; results do not depend on it [default: one per processor]
+    #[arg(long, global = true, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    threads: Option<u16>,
+    /// Write words and wall times to this file too; its name ends in .log
+    #[arg(long, global = true, value_name = "FILE")]
+    log: Option<PathBuf>,
+    /// Print errors only
+    #[arg(long, short, global = true)]
+    quiet: bool,
+    /// Exit with 0 instead of 3 when episodes were dropped; they are counted and named all the same
+    #[arg(long, global = true)]
+    allow_dropped: bool,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    Plan(plan::Args),
+    Simulate(simulate::Args),
+    Convert(convert::Args),
+    Pretrain(pretrain::Args),
+    Train(train::Args),
+    Evaluate(evaluate::Args),
+    Inspect(inspect::Args),
+    Render(render::Args),
+    Settings(settings::Args),
+}
+
+impl Cli {
+    /// Runs the chosen stage.
+    ///
+    /// # Errors
+    /// What the stage returns; [`Error::Failed`] when no worker threads can be started.
+    pub fn run(&self, interrupt: Interrupt) -> Result<Outcome> {
+        let threads = self.threads.map_or(0, usize::from); // 0 leaves the choice to rayon: one per processor
+        rayon::ThreadPoolBuilder::new()
+            .num_threads(threads)
+            .build_global()
+            .map_err(|e| Error::Failed(format!("cannot start worker threads: {e}; try --threads 1")))?;
+        let goes_on = matches!(&self.command, Command::Train(args) if args.resume);
+        let context = Context { console: Console::new(self.quiet, self.log.as_deref(), goes_on), interrupt };
+        let started = Instant::now();
+        let outcome = match &self.command {
+            Command::Plan(args) => plan::run(args, &context),
+            Command::Simulate(args) => simulate::run(args, &context),
+            Command::Convert(args) => convert::run(args, &context),
+            Command::Pretrain(args) => pretrain::run(args, &context),
+            Command::Train(args) => train::run(args, &context),
+            Command::Evaluate(args) => evaluate::run(args, &context),
+            Command::Inspect(args) => return inspect::run(args, &context),
+            Command::Render(args) => render::run(args, &context),
+            Command::Settings(args) => return settings::run(args, &context),
+        };
+        if outcome.is_ok() {
+            context.console.say(&format!("wall time {:.1} s", started.elapsed().as_secs_f64()));
+        }
+        match outcome {
+            Ok(Outcome::Dropped(_)) if self.allow_dropped => Ok(Outcome::Done),
+            other => other,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::CommandFactory;
+
+    #[test]
+    fn the_command_line_is_consistent() {
+        super::Cli::command().debug_assert();
+    }
+}
