@@ -31,6 +31,7 @@
 //! - [`data`]: files, the only home of MCAP, Arrow, Parquet and safetensors; knows no learning
 //! - [`nn`] (networks and their engine, knows no robots), then [`learn`] (the method, knows neither files nor simulator)
 //! - [`eval`]: policies in the simulator; [`report`]: pictures, charts, tables
+//! - [`experiment`]: grids of runs as steps; starts no process
 //! - [`cmd`]: the command line
 #![warn(missing_docs)]
 
@@ -40,6 +41,7 @@ pub mod data;
 pub mod demo;
 pub mod error;
 pub mod eval;
+pub mod experiment;
 pub mod guard;
 pub mod interrupt;
 pub mod learn;

@@ -9,7 +9,7 @@ const EVERYWHERE: [&str; 13] =
     ["config", "demo", "error", "guard", "interrupt", "math", "pulse", "scene", "seed", "state", "table", "tensor", "words"];
 
 /// What else each module may use. A module that is not here is refused, so that a new one gets its place on purpose.
-const FLOW: [(&str, &[&str]); 18] = [
+const FLOW: [(&str, &[&str]); 19] = [
     // Contracts know the tasks, because states and conditions depend on them.
     ("state", &["tasks"]),
     ("scene", &["tasks"]),
@@ -24,7 +24,8 @@ const FLOW: [(&str, &[&str]); 18] = [
     ("learn", &["nn", "robot", "tasks"]),
     ("eval", &["learn", "sim", "tasks"]),
     ("report", &["data", "robot", "tasks"]),
-    ("cmd", &["data", "eval", "learn", "plan", "report", "robot", "sim", "tasks"]),
+    ("experiment", &["data", "eval", "learn", "plan", "tasks"]),
+    ("cmd", &["data", "eval", "experiment", "learn", "plan", "report", "robot", "sim", "tasks"]),
     ("error", &[]),
     ("seed", &[]),
     ("math", &[]),

@@ -4,10 +4,10 @@ mod checkpoint;
 mod common;
 mod console;
 mod convert;
-mod differences;
 mod dropped;
 mod epochs;
 mod evaluate;
+mod experiment;
 mod inspect;
 mod output;
 mod places;
@@ -91,6 +91,7 @@ enum Command {
     Inspect(inspect::Args),
     Render(render::Args),
     Settings(settings::Args),
+    Experiment(experiment::Args),
 }
 
 impl Cli {
@@ -114,6 +115,7 @@ impl Cli {
             Command::Pretrain(args) => pretrain::run(args, &context),
             Command::Train(args) => train::run(args, &context),
             Command::Evaluate(args) => evaluate::run(args, &context),
+            Command::Experiment(args) => experiment::run(args, &context),
             Command::Inspect(args) => return inspect::run(args, &context),
             Command::Render(args) => render::run(args, &context),
             Command::Settings(args) => return settings::run(args, &context),

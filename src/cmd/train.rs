@@ -12,14 +12,13 @@ use crate::learn::{Checkpoint, Dynamics, Hooks, Method, Policy, Selection, train
 use crate::scene::Scene;
 use crate::sim::Controller;
 use crate::tasks::Task;
-use crate::words::did_you_mean;
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;
 
 /// Kind of the weights that this stage writes.
-pub const KIND: &str = "policy";
+pub const KIND: &str = weights::POLICY;
 
 /// Learn the policy: hybrid imitation learning (Algorithm 1), behavior cloning (2) or state cloning (3).
 #[derive(Debug, clap::Args)]
@@ -27,7 +26,7 @@ pub struct Args {
     #[command(flatten)]
     settings: SettingsArgs,
     /// Method: hil, bc or sc
-    #[arg(long, value_name = "METHOD", default_value = "hil", value_parser = method)]
+    #[arg(long, value_name = "METHOD", default_value = "hil")]
     method: Method,
     /// State recovery probability, 0 to 1 [default: train.rho]
     #[arg(long, value_name = "RHO", allow_negative_numbers = true)]
@@ -60,7 +59,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome> {
         args.settings.resolve(&[("train.rho", args.rho.map(|v| v.to_string())), ("train.alpha", args.alpha.clone())])?;
     let dir = path_or(args.dataset.as_deref(), pipeline.task, "dataset");
     let model = path_or(args.dynamics.as_deref(), pipeline.task, "dynamics.safetensors");
-    let method = format!("{:?}", args.method).to_lowercase();
+    let method = args.method.name();
     // As `make all METHOD=bc` has it: another method replaces no policy of hil.
     let name = if args.method == Method::Hil { "policy.safetensors".into() } else { format!("policy-{method}.safetensors") };
     let out = path_or(args.out.as_deref(), pipeline.task, &name);
@@ -139,16 +138,4 @@ fn read_dynamics(path: &Path, task: Task) -> Result<(Dynamics, ContentHash)> {
     let (tensors, meta, made, content) = weights::read_hashed(path, pretrain::KIND)?;
     same_task(path, made.task, task)?;
     Ok((Dynamics::from_tensors(&tensors, &meta).map_err(|why| Error::input(path, why))?, content))
-}
-
-fn method(name: &str) -> std::result::Result<Method, String> {
-    match name {
-        "hil" => Ok(Method::Hil),
-        "bc" => Ok(Method::Bc),
-        "sc" => Ok(Method::Sc),
-        _ => {
-            let hint = did_you_mean(name, ["hil", "bc", "sc"]);
-            Err(format!("unknown method \"{name}\"{hint}; allowed: hil (both losses), bc (behavior cloning), sc (state cloning)"))
-        }
-    }
 }

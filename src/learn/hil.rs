@@ -14,9 +14,11 @@ use crate::math;
 use crate::nn::cosine;
 use crate::seed::stream;
 use crate::table::Table;
+use crate::words::{did_you_mean, shown};
 use rand::seq::SliceRandom;
 use serde::{Deserialize, Serialize};
 use std::borrow::Cow;
+use std::str::FromStr;
 
 /// Which losses teach the policy.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -30,6 +32,14 @@ pub enum Method {
 }
 
 impl Method {
+    /// All methods.
+    pub const ALL: [Method; 3] = [Method::Hil, Method::Bc, Method::Sc];
+
+    /// The name on the command line and in files.
+    pub fn name(self) -> &'static str {
+        ["hil", "bc", "sc"][self as usize]
+    }
+
     /// alpha of Eq. 1.
     fn alpha(self, settings: &TrainSettings) -> Alpha {
         match self {
@@ -37,6 +47,18 @@ impl Method {
             Method::Bc => Alpha::Fixed(0.0),
             Method::Sc => Alpha::Fixed(1.0),
         }
+    }
+}
+
+impl FromStr for Method {
+    type Err = String;
+
+    fn from_str(s: &str) -> std::result::Result<Self, String> {
+        Method::ALL.into_iter().find(|m| m.name() == s).ok_or_else(|| {
+            let hint = did_you_mean(s, Method::ALL.map(Method::name));
+            let s = shown(s);
+            format!("unknown method \"{s}\"{hint}; allowed: hil (both losses), bc (behavior cloning), sc (state cloning)")
+        })
     }
 }
 
