@@ -174,7 +174,9 @@ experiment: $(HILT) ## run experiment NAME of pipelines/experiments under RUNS/e
 	@:$(call one-of,NAME,$(EXPERIMENTS))
 	$(call EXPERIMENT,$(NAME))
 
-table2 table3: $(HILT) ## the paper's tables 2 and 3 (hours); SEEDS=0-1 EPISODES=20 for less
+table2: $(HILT) ## the paper's Table 2 (hours); SEEDS=0-1 EPISODES=20 for less
+table3: $(HILT) ## the paper's Table 3 (hours)
+table2 table3:
 	$(call EXPERIMENT,$@)
 
 figures: $(HILT) ## the runs behind the paper's figures 6, 7 and 8
@@ -244,6 +246,6 @@ help: ## this list
 	@echo "make TARGET [TASK=pick-up|pick-and-place|stack] [RUNS=DIR] [SEED=N] [THREADS=N] [PRESET=best|paper] [PIPELINE=FILE]"
 	@echo "            [METHOD=hil|bc|sc] [RESUME=1] [CHECKPOINT=SECONDS] [SET=\"stage.key=value ...\"]"
 	@echo "            experiments: [NAME=$(subst $( ) ,|,$(EXPERIMENTS))] [SEEDS=0-4,9] [EPISODES=N] [JOBS=N]"
-	@awk -F ':.*## ' '/^[a-z0-9 -]+:.*## / { printf "  %-11s %s\n", $$1, $$2 }' $(firstword $(MAKEFILE_LIST))
+	@awk -F ':.*## ' '/^[a-z0-9 -]+:.*## / { printf "  %-12s %s\n", $$1, $$2 }' $(firstword $(MAKEFILE_LIST))
 	@echo "RUNS is a directory without blanks and special characters. METHOD=bc writes policy-bc.safetensors and evaluation-bc.json beside those of hil."
 	@echo "Results are not rebuilt when only the source code changes: make clean-runs first."

@@ -1,6 +1,7 @@
 //! The settings of every stage for one task, preset and variation.
 
-use super::file::{Experiment, Variation};
+use super::file::Experiment;
+use super::variation::Variation;
 use crate::config::{Pipeline, Preset, Source, Stage};
 use crate::error::{Error, Result};
 use crate::learn::Method;

@@ -39,10 +39,8 @@ pub type Contents = Vec<Option<ContentHash>>;
 /// Looks at every step.
 ///
 /// # Errors
-/// [`Error::Input`] for a dataset that the experiment names and that is none, or of another task; [`Error::Failed`] when artefacts of other settings
-/// or inputs stand where the experiment's go.
+/// [`Error::Failed`] when artefacts of other settings or inputs stand where the experiment's go.
 pub fn survey(grid: &Grid) -> Result<Contents> {
-    grid.steps.iter().try_for_each(check_given)?;
     let found: Vec<Option<(Provenance, ContentHash)>> = grid.steps.par_iter().map(found).collect();
     let (mut contents, mut conflicts) = (Contents::new(), Vec::new());
     for (step, found) in grid.steps.iter().zip(found) {
@@ -93,9 +91,9 @@ pub fn look(step: &Step, contents: &Contents) -> Result<Option<ContentHash>> {
     }
 }
 
-/// The artefact, where all outputs are there and it is whole. What is damaged is made again: the stage itself refuses to replace what is not its own.
+/// The artefact, where it is there and whole. What is damaged is made again: the stage itself refuses to replace what is not its own.
 fn found(step: &Step) -> Option<(Provenance, ContentHash)> {
-    if !step.is_there() {
+    if !step.artefact().exists() {
         return None;
     }
     origin(step.artefact(), step.outputs[0].kind).ok()
@@ -108,7 +106,7 @@ fn check(step: &Step, path: &Path, theirs: &Provenance, contents: &Contents) -> 
     if step.stage == Stage::Evaluate && ours.settings["evaluate"]["horizon_steps"] == 0 {
         ours.settings["evaluate"]["horizon_steps"] = theirs.settings["evaluate"]["horizon_steps"].clone();
     }
-    let mut verified = true;
+    let mut verified = step.is_there();
     for input in &step.inputs {
         let known = match input.from {
             Some(from) => contents[from],
@@ -138,9 +136,13 @@ fn check_checkpoint(step: &Step, contents: &Contents) -> std::result::Result<(),
     }
 }
 
-/// A dataset that the experiment names must be there before anything begins.
-fn check_given(step: &Step) -> Result<()> {
-    for input in step.inputs.iter().filter(|input| input.from.is_none()) {
+/// The datasets that an experiment names must be there before anything begins.
+///
+/// # Errors
+/// [`Error::Input`] for one that is none, or of another task.
+pub fn check_given(grid: &Grid) -> Result<()> {
+    let given = grid.steps.iter().flat_map(|step| step.inputs.iter().map(move |input| (step, input)));
+    for (step, input) in given.filter(|(_, input)| input.from.is_none()) {
         let made = dataset::provenance(&input.path.join(dataset::TRAIN))?;
         dataset::provenance(&input.path.join(dataset::VALIDATION))?;
         if made.task != step.task {

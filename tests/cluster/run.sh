@@ -1,5 +1,6 @@
 #!/usr/bin/env bash
-# A tiny experiment three ways: by hilt itself, by Snakemake, and by a real slurmctld and slurmd on loopback. All must leave the same bytes.
+# A tiny experiment three ways: by hilt itself, by Snakemake, and by a real slurmctld and slurmd on loopback. All must leave the same bytes, also
+# when they are killed (SIGKILL) at five random moments and begun again.
 #
 #   run.sh HILT
 #
@@ -22,11 +23,15 @@ install() {
         python3 -m venv "$venv" > "$work/pip.log" 2>&1 && "$venv/bin/pip" install -q snakemake >> "$work/pip.log" 2>&1 \
             || die "snakemake is missing and could not be installed (needs python3-venv and a package index): $work/pip.log"
     fi
-    if ! command -v slurmctld slurmd sbatch munged > /dev/null; then
-        [ "$(id -u)" = 0 ] && command -v apt-get > /dev/null || die "slurmctld, slurmd, sbatch or munged is missing, and only root with apt-get could install it"
+    local missing= program
+    for program in slurmctld slurmd sbatch munged setpriv; do
+        command -v "$program" > /dev/null || missing="$missing $program"
+    done
+    if [ -n "$missing" ]; then
+        [ "$(id -u)" = 0 ] && command -v apt-get > /dev/null || die "missing:$missing; only root with apt-get could install it"
         say "installs slurm and munge"
         { apt-get update && DEBIAN_FRONTEND=noninteractive apt-get install -y --no-install-recommends slurmctld slurmd slurm-client munge; } \
-            > "$work/apt.log" 2>&1 || die "slurm or munge is missing and could not be installed: $work/apt.log"
+            > "$work/apt.log" 2>&1 || die "missing:$missing; apt-get could not install it: $work/apt.log"
     fi
     [ "$(id -u)" = 0 ] || die "slurmd on loopback needs root"
 }
@@ -36,22 +41,27 @@ stop() {
     local pid
     for pid in "${pids[@]}"; do kill "$pid" 2> /dev/null || true; done
     for pid in "${pids[@]}"; do wait "$pid" 2> /dev/null || true; done
+    # What the daemons said stays where something went wrong.
+    [ -z "$done" ] || rm -rf "$cluster"
 }
+done= cluster=
 trap stop EXIT
 
 # Daemons of our own beside whatever the machine has: own ports, own directories, own key.
 cluster() {
-    local dir=$work/slurm host
+    local dir host
     host=$(hostname -s)
-    rm -rf "$dir"
-    mkdir -p "$dir"/{state,spool,munge}
-    chmod 0711 "$work" "$dir"
+    # The name of a socket is short, and munge's own user must come this far.
+    dir=$(mktemp -d /tmp/hilt-cluster.XXXXXX)
+    cluster=$dir
+    chmod 0711 "$dir"
+    mkdir "$dir"/{state,spool,munge}
     head -c 1024 /dev/urandom > "$dir/munge/key"
     chown -R munge: "$dir/munge"
     chmod 0400 "$dir/munge/key"
     chmod 0755 "$dir/munge"
     setpriv --reuid munge --regid munge --clear-groups munged --foreground --force --key-file="$dir/munge/key" --socket="$dir/munge/socket" \
-        --pid-file="$dir/munge/pid" --log-file="$dir/munge/log" --seed-file="$dir/munge/seed" &
+        --pid-file="$dir/munge/pid" --log-file="$dir/munge/log" --seed-file="$dir/munge/seed" > "$dir/munged.out" 2>&1 &
     pids+=($!)
     cat > "$dir/slurm.conf" <<EOF
 ClusterName=loopback
@@ -98,16 +108,51 @@ EOF
     say "$(slurmctld -V) runs on loopback"
 }
 
-by_slurm() {
-    local job tries=0
-    bash runs/experiments/tiny/submit.sh --time=10 > submitted
-    cat submitted
-    job=$(awk '$1 == "collect:" { print $3 }' submitted)
+kills=5
+# A random part of so many seconds, those of an undisturbed run.
+random() { awk -v most="$1" -v n="$RANDOM" 'BEGIN { printf "%.2f\n", 0.5 + n / 32768 * most }'; }
+
+snakemake() { "$venv/bin/snakemake" --cores "$threads" --snakefile runs/experiments/tiny/Snakefile "$@" >> snakemake.log 2>&1; }
+
+killed_snakemake() {
+    local kill pid
+    for kill in $(seq $kills); do
+        setsid "$venv/bin/snakemake" --cores "$threads" --snakefile runs/experiments/tiny/Snakefile --rerun-incomplete >> snakemake.log 2>&1 &
+        pid=$!
+        sleep "$(random "$snakemake_s")"
+        kill -KILL -- "-$pid" 2> /dev/null || true
+        wait "$pid" 2> /dev/null || true
+        say "snakemake killed ($kill): $(find runs -type f -name 'evaluation.json' | wc -l) of 6 evaluations are there"
+        snakemake --unlock
+    done
+    snakemake --rerun-incomplete || die "snakemake failed: $PWD/snakemake.log"
+}
+
+queue_is_empty() {
+    local tries=0
     while squeue --noheader --format=%i 2> /dev/null | grep -q .; do
         tries=$((tries + 1))
-        [ $tries -lt 1200 ] || die "slurm is not done after ten minutes: job $job of $work/slurm-run"
+        [ $tries -lt 1200 ] || die "slurm is not done after ten minutes: $PWD"
         sleep 0.5
     done
+}
+
+killed_slurm() {
+    local kill
+    for kill in $(seq $kills); do
+        bash runs/experiments/tiny/submit.sh --time=10 > submitted
+        sleep "$(random "$slurm_s")"
+        scancel --full --signal=KILL --user root --state RUNNING 2> /dev/null || true
+        scancel --user root
+        queue_is_empty
+        say "slurm killed ($kill): $(find runs -type f -name 'evaluation.json' | wc -l) of 6 evaluations are there"
+    done
+    by_slurm
+}
+
+by_slurm() {
+    bash runs/experiments/tiny/submit.sh --time=10 > submitted || die "sbatch failed: $PWD/submitted"
+    queue_is_empty
 }
 
 # What must not depend on who ran it.
@@ -115,32 +160,50 @@ listing() { (cd "$1/runs/experiments/tiny" && find . -type f ! -path './logs/*' 
 
 mkdir -p "$work"
 install
-for way in plain snakemake slurm-run; do
+for way in plain snakemake snakemake-killed slurm slurm-killed; do
     rm -rf "${work:?}/$way"
     mkdir -p "$work/$way"
     cp "$root/tests/cluster/tiny.toml" "$work/$way"
 done
 
+# compare WAY: the bytes of the plain run.
+compare() {
+    listing "$work/$1" > "$work/$1.sums"
+    diff "$work/plain.sums" "$work/$1.sums" || die "$1 left other bytes; logs are in $work/$1/runs/experiments/tiny/logs"
+    "$hilt" experiment tiny.toml --threads "$threads" 2>&1 > /dev/null | grep -q ' 0 of .* steps to do' || die "hilt would run steps of $1 again"
+    say "$1: the same bytes"
+}
+
 cd "$work/plain"
-"$hilt" experiment tiny.toml --threads "$threads" --jobs 1 > /dev/null
+"$hilt" experiment tiny.toml --quiet --threads "$threads" --jobs 1 > /dev/null
 listing "$work/plain" > "$work/plain.sums"
 say "plain: $(wc -l < "$work/plain.sums") files"
 
 cd "$work/snakemake"
-"$hilt" experiment tiny.toml --threads "$threads" --jobs 1 --emit snakemake
-"$venv/bin/snakemake" --cores "$threads" --snakefile runs/experiments/tiny/Snakefile > snakemake.log 2>&1 || die "snakemake failed: $work/snakemake/snakemake.log"
+"$hilt" experiment tiny.toml --quiet --threads "$threads" --jobs 1 --emit snakemake
+began=$SECONDS
+snakemake || die "snakemake failed: $PWD/snakemake.log"
+snakemake_s=$((SECONDS - began))
 "$venv/bin/snakemake" --cores "$threads" --snakefile runs/experiments/tiny/Snakefile --dry-run 2>&1 | grep -q 'Nothing to be done' \
     || die "snakemake would run steps again that are done"
-listing "$work/snakemake" > "$work/snakemake.sums"
-diff "$work/plain.sums" "$work/snakemake.sums" || die "snakemake left other bytes"
-say "snakemake $("$venv/bin/snakemake" --version): the same bytes"
+say "snakemake $("$venv/bin/snakemake" --version) takes $snakemake_s s"
+compare snakemake
+cd "$work/snakemake-killed"
+"$hilt" experiment tiny.toml --quiet --threads "$threads" --jobs 1 --emit snakemake
+killed_snakemake
+compare snakemake-killed
 
 cluster
-cd "$work/slurm-run"
-"$hilt" experiment tiny.toml --threads 1 --jobs 1 --emit slurm
+cd "$work/slurm"
+"$hilt" experiment tiny.toml --quiet --threads 1 --jobs 1 --emit slurm
+began=$SECONDS
 by_slurm
-listing "$work/slurm-run" > "$work/slurm.sums"
-diff "$work/plain.sums" "$work/slurm.sums" || die "slurm left other bytes: logs in $work/slurm-run/runs/experiments/tiny/logs"
-say "slurm: the same bytes"
-"$hilt" experiment tiny.toml --threads "$threads" 2>&1 > /dev/null | grep -q '0 of .* steps to do' || die "hilt would run steps again that slurm has done"
-say "all three ways leave the same $(wc -l < "$work/plain.sums") files"
+slurm_s=$((SECONDS - began))
+say "slurm takes $slurm_s s"
+compare slurm
+cd "$work/slurm-killed"
+"$hilt" experiment tiny.toml --quiet --threads 1 --jobs 1 --emit slurm
+killed_slurm
+compare slurm-killed
+say "all five ways leave the same $(wc -l < "$work/plain.sums") files"
+done=yes

@@ -37,7 +37,7 @@ fn a_training_that_was_stopped_does_not_go_on_as_another() {
     let child = sweep.start(&["--seeds", "11"]);
     let log = sweep.at(&format!("{DIR}/logs/pick-up/seed-11/best/plain/hil/train.log"));
     let began = std::time::Instant::now();
-    let at_work = || std::fs::read_to_string(&log).is_ok_and(|words| words.contains("warm"));
+    let at_work = || std::fs::read_to_string(&log).is_ok_and(|words| words.contains("warm-start: "));
     while !at_work() && began.elapsed().as_secs() < 60 {
         std::thread::sleep(std::time::Duration::from_millis(20));
     }

@@ -5,7 +5,7 @@ mod runner;
 
 use super::{Context, Outcome, places::Places};
 use crate::error::{Error, Result};
-use crate::experiment::state::{State, states, survey};
+use crate::experiment::state::{State, check_given, states, survey};
 use crate::experiment::{Experiment, Grid, Overrides, emit, find, leftovers, seeds_of};
 use std::path::{Path, PathBuf};
 
@@ -101,6 +101,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome> {
     if dir_is_file(&checked.dir) {
         return Err(Error::input(&checked.dir, "is a file; the experiment's directory goes there: choose another --dir"));
     }
+    check_given(&checked.grid)?;
     leftovers::check(&checked.dir, &checked.grid)?;
     let runs = !(args.instead.dry_run || args.instead.list.is_some() || args.instead.emit.is_some() || args.instead.collect);
     // Taken before the look at what is done: steps that a killed run has left may still be at work.
