@@ -14,6 +14,11 @@ RESUME ?=
 CHECKPOINT ?= 60
 # Overrides, separated by blanks: SET="plan.speed=0.5 train.rho=0.3"; a blank inside brackets or quotes belongs to the value.
 SET    ?=
+# An experiment's name; its seeds (0-4,9) and episodes, and how many of its steps run side by side, where not as its file or hilt has them.
+NAME     ?= smoke
+SEEDS    ?=
+EPISODES ?=
+JOBS     ?=
 # Worker threads; no result depends on them.
 ifeq ($(origin THREADS),undefined)
   THREADS := $(shell nproc 2>/dev/null || sysctl -n hw.ncpu 2>/dev/null || echo 2)
@@ -43,11 +48,16 @@ override METHOD     := $(strip $(call typed,METHOD))
 override RESUME     := $(strip $(call typed,RESUME))
 override CHECKPOINT := $(strip $(call typed,CHECKPOINT))
 override SET        := $(call typed,SET)
+override NAME       := $(strip $(call typed,NAME))
+override SEEDS      := $(strip $(call typed,SEEDS))
+override EPISODES   := $(strip $(call typed,EPISODES))
+override JOBS       := $(strip $(call typed,JOBS))
 override THREADS    := $(strip $(call typed,THREADS))
 
 TASKS := pick-up pick-and-place stack
 PRESETS := best paper
 METHODS := hil bc sc
+EXPERIMENTS := $(patsubst pipelines/experiments/%.toml,%,$(wildcard pipelines/experiments/*.toml))
 
 # Characters that mean something to make or to a shell.
 ODD := ' " ` \ : ; % & | < > ( ) { } [ ] * ? ! ~ = $$ \#
@@ -91,7 +101,7 @@ POLICY     := $(DIR)/policy$(OF).safetensors
 EVALUATION := $(DIR)/evaluation$(OF).json
 ARTEFACTS  := $(PLANS) $(RECORDINGS) $(DATASET) $(DYNAMICS) $(POLICY) $(EVALUATION)
 
-.PHONY: all stages smoke test check interop qemu bench fuzz help clean-runs build need-cargo FORCE $(ARTEFACTS)
+.PHONY: all stages smoke experiment table2 table3 figures test cluster-test check interop qemu bench fuzz help clean-runs build need-cargo FORCE $(ARTEFACTS)
 
 all: $(EVALUATION) ## run every stage of TASK; writes RUNS/TASK/policy.safetensors and RUNS/TASK/evaluation.json
 	@$(MADE) result
@@ -154,6 +164,26 @@ $(STAMP)/evaluate$(OF).toml: $(STAMP)/train$(OF).toml
 	$(HILT) evaluate $(FLAGS) $(call RUN,evaluate$(OF)) --policy $(POLICY) --out $(EVALUATION)
 	@$(MADE) done evaluate
 
+# --- experiments --------------------------------------------------------------------------------------------------------------------
+
+# What is finished of them is not done again; hilt itself sees to that.
+optional = $(if $($(2)),--$(1) $(call word-of,$($(2))))
+EXPERIMENT = $(HILT) experiment $(1) --dir $(RUNS)/experiments/$(1) --threads $(THREADS) $(call optional,seeds,SEEDS) $(call optional,episodes,EPISODES) $(call optional,jobs,JOBS)
+
+experiment: $(HILT) ## run experiment NAME of pipelines/experiments under RUNS/experiments/NAME
+	@:$(call one-of,NAME,$(EXPERIMENTS))
+	$(call EXPERIMENT,$(NAME))
+
+table2: $(HILT) ## the paper's Table 2 (hours); SEEDS=0-1 EPISODES=20 for less
+table3: $(HILT) ## the paper's Table 3 (hours)
+table2 table3:
+	$(call EXPERIMENT,$@)
+
+figures: $(HILT) ## the runs behind the paper's figures 6, 7 and 8
+	$(call EXPERIMENT,figure6)
+	$(call EXPERIMENT,figure7)
+	$(call EXPERIMENT,figure8)
+
 # --- the binary ---------------------------------------------------------------------------------------------------------------------
 
 build: $(HILT) ## build the optimised binary
@@ -193,6 +223,9 @@ check: need-cargo ## what CI runs: format, lints, documentation, tests
 	RUSTDOCFLAGS="-D warnings" cargo doc --release --locked --no-deps
 	cargo test --release --locked
 
+cluster-test: build ## a tiny experiment through Snakemake and through Slurm on this machine, the bytes of a plain run (needs root, installs both)
+	tests/cluster/run.sh $(HILT)
+
 interop: build ## tiny runs of all tasks, read by mcap, pyarrow, DuckDB, pandas, LeRobot and safetensors (needs Python 3.12)
 	for task in $(TASKS); do $(MAKE) --no-print-directory all TASK=$$task RUNS=$(RUNS)/smoke SET="$(SMOKE)"; done
 	tests/interop/run.sh $(RUNS)/smoke
@@ -212,6 +245,7 @@ clean-runs: ## remove what was made for TASK under RUNS; files that make did not
 help: ## this list
 	@echo "make TARGET [TASK=pick-up|pick-and-place|stack] [RUNS=DIR] [SEED=N] [THREADS=N] [PRESET=best|paper] [PIPELINE=FILE]"
 	@echo "            [METHOD=hil|bc|sc] [RESUME=1] [CHECKPOINT=SECONDS] [SET=\"stage.key=value ...\"]"
-	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  %-11s %s\n", $$1, $$2 }' $(firstword $(MAKEFILE_LIST))
+	@echo "            experiments: [NAME=$(subst $( ) ,|,$(EXPERIMENTS))] [SEEDS=0-4,9] [EPISODES=N] [JOBS=N]"
+	@awk -F ':.*## ' '/^[a-z0-9 -]+:.*## / { printf "  %-12s %s\n", $$1, $$2 }' $(firstword $(MAKEFILE_LIST))
 	@echo "RUNS is a directory without blanks and special characters. METHOD=bc writes policy-bc.safetensors and evaluation-bc.json beside those of hil."
 	@echo "Results are not rebuilt when only the source code changes: make clean-runs first."

@@ -34,6 +34,7 @@
 //! - [`data`]: files, the only home of MCAP, Arrow, Parquet and safetensors; knows no learning
 //! - [`learn`]: networks of policy and dynamics, losses, methods, and the loop around them; knows neither files nor simulator
 //! - [`eval`]: policies in the simulator; [`report`]: pictures, charts, tables
+//! - [`experiment`]: grids of runs as steps; starts no process
 //! - [`cmd`]: the command line
 #![warn(missing_docs)]
 
@@ -43,6 +44,7 @@ pub mod data;
 pub mod demo;
 pub mod error;
 pub mod eval;
+pub mod experiment;
 pub mod guard;
 pub mod interrupt;
 pub mod learn;

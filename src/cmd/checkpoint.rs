@@ -1,7 +1,7 @@
 //! The checkpoint of training as a file beside its result.
 
 use super::Console;
-use super::differences::first_difference;
+use crate::data::differences::first_difference;
 use crate::data::{Provenance, weights};
 use crate::error::{Error, Result};
 use crate::learn::Checkpoint;

@@ -2,7 +2,7 @@
 
 use super::console::Console;
 use super::context::{Context, Outcome};
-use super::{convert, evaluate, inspect, plan, pretrain, render, settings, simulate, train};
+use super::{convert, evaluate, experiment, inspect, plan, pretrain, render, settings, simulate, train};
 use crate::error::{Error, Result};
 use crate::interrupt::Interrupt;
 use clap::{Parser, Subcommand};
@@ -49,6 +49,7 @@ enum Command {
     Inspect(inspect::Args),
     Render(render::Args),
     Settings(settings::Args),
+    Experiment(experiment::Args),
 }
 
 impl Cli {
@@ -72,6 +73,7 @@ impl Cli {
             Command::Pretrain(args) => pretrain::run(args, &context),
             Command::Train(args) => train::run(args, &context),
             Command::Evaluate(args) => evaluate::run(args, &context),
+            Command::Experiment(args) => experiment::run(args, &context),
             Command::Inspect(args) => return inspect::run(args, &context),
             Command::Render(args) => render::run(args, &context),
             Command::Settings(args) => return settings::run(args, &context),

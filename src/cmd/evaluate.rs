@@ -1,8 +1,8 @@
 use super::common::{SettingsArgs, path_or, same_task};
-use super::differences::{Difference, differences};
 use super::places::{Content, Places, beside};
 use super::{Console, Context, Outcome, output, train};
 use crate::config::{Pipeline, Stage};
+use crate::data::differences::{Difference, differences};
 use crate::data::provenance::Provenance;
 use crate::data::{ContentHash, atomic, json_file, recording, table_file, weights};
 use crate::demo::Episode;

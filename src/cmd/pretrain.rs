@@ -14,7 +14,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 /// Kind of the weights that this stage writes.
-pub const KIND: &str = "dynamics";
+pub const KIND: &str = weights::DYNAMICS;
 
 /// Learn the dynamics network from the demonstrations (Algorithm 4) and report its errors per state group.
 #[derive(Debug, clap::Args)]

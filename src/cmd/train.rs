@@ -12,14 +12,13 @@ use crate::learn::{Checkpoint, Dynamics, Hooks, Inputs, MethodName, Policy, Sele
 use crate::scene::Scene;
 use crate::sim::Controller;
 use crate::task::Task;
-use crate::words::did_you_mean;
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;
 
 /// Kind of the weights that this stage writes.
-pub const KIND: &str = "policy";
+pub const KIND: &str = weights::POLICY;
 
 /// Learn the policy: hybrid imitation learning (Algorithm 1), behavior cloning (2) or state cloning (3).
 #[derive(Debug, clap::Args)]
@@ -27,7 +26,7 @@ pub struct Args {
     #[command(flatten)]
     settings: SettingsArgs,
     /// Method: hil, bc or sc
-    #[arg(long, value_name = "METHOD", default_value = "hil", value_parser = method)]
+    #[arg(long, value_name = "METHOD", default_value = "hil")]
     method: MethodName,
     /// State recovery probability, 0 to 1 [default: train.rho]
     #[arg(long, value_name = "RHO", allow_negative_numbers = true)]
@@ -139,12 +138,4 @@ fn read_dynamics(path: &Path, task: Task) -> Result<(Dynamics, ContentHash)> {
     let (tensors, meta, made, content) = weights::read_hashed(path, pretrain::KIND)?;
     same_task(path, made.task, task)?;
     Ok((Dynamics::from_tensors(&tensors, &meta).map_err(|why| Error::input(path, why))?, content))
-}
-
-fn method(name: &str) -> std::result::Result<MethodName, String> {
-    let names = MethodName::ALL.map(MethodName::name);
-    MethodName::ALL.into_iter().find(|method| method.name() == name).ok_or_else(|| {
-        let hint = did_you_mean(name, names);
-        format!("unknown method \"{name}\"{hint}; allowed: hil (both losses), bc (behavior cloning), sc (state cloning)")
-    })
 }

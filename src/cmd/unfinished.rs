@@ -4,10 +4,10 @@
 //! Each run (settings, seed, inputs, version) has a directory of its own in there, named by the hash of its provenance: runs cannot take each other's
 //! pieces, and none removes another's. A piece is a file under a name of its own, which appears whole or not at all.
 
-use super::differences::first_difference;
 use super::shard::Shard;
 use super::{Console, places};
 use crate::data::atomic::{self, Workplace};
+use crate::data::differences::first_difference;
 use crate::data::{ContentHash, Provenance};
 use crate::error::{Error, Result};
 use std::fs;

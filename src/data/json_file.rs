@@ -1,7 +1,7 @@
 //! Summaries as JSON: keys sorted, indented, with provenance and seal under the key `hilt`.
 
 use super::bytes::{Ends, Format};
-use super::{Provenance, atomic, json_text, provenance, seal};
+use super::{ContentHash, Provenance, atomic, json_text, provenance, seal};
 use crate::error::{Error, Result};
 use crate::guard::guarded;
 use serde_json::{Map, Value, json};
@@ -59,7 +59,17 @@ fn check_ends(path: &Path, ends: &Ends) -> Result<()> {
 /// # Errors
 /// [`Error::Input`] when the file is no such JSON, is of another schema version or was changed.
 pub fn read(path: &Path) -> Result<(Value, Provenance)> {
-    decode(path, &FORMAT.read(path)?)
+    read_hashed(path).map(|(value, provenance, _)| (value, provenance))
+}
+
+/// As [`read`], with the hash of the bytes that were read.
+///
+/// # Errors
+/// As [`read`].
+pub fn read_hashed(path: &Path) -> Result<(Value, Provenance, ContentHash)> {
+    let bytes = FORMAT.read(path)?;
+    let hash = ContentHash::of(&bytes);
+    decode(path, &bytes).map(|(value, provenance)| (value, provenance, hash))
 }
 
 /// The summary in the bytes of the file at `path`.

@@ -16,6 +16,10 @@ use std::path::Path;
 
 /// The kind of a checkpoint of training; every other kind is a network's.
 pub const CHECKPOINT: &str = "checkpoint";
+/// Kind of the weights that `hilt pretrain` writes.
+pub const DYNAMICS: &str = "dynamics";
+/// Kind of the weights that `hilt train` writes.
+pub const POLICY: &str = "policy";
 
 /// Bytes of a number.
 const F32_BYTES: usize = size_of::<f32>();

@@ -12,7 +12,7 @@ const LEAVES: [&str; 8] = ["error", "guard", "interrupt", "math", "seed", "table
 
 /// What else each module may use. The order is the house's: a module uses only those above it. One that is not here is refused, so that a
 /// new one gets its place on purpose.
-const FLOW: [(&str, &[&str]); 17] = [
+const FLOW: [(&str, &[&str]); 18] = [
     ("nn", &[]),
     ("task", &[]),
     ("state", &["task"]),
@@ -28,9 +28,10 @@ const FLOW: [(&str, &[&str]); 17] = [
     ("learn", &["config", "demo", "nn", "pulse", "robot", "state", "task", "tasks"]),
     ("eval", &["config", "demo", "learn", "scene", "sim", "state", "task", "tasks"]),
     ("report", &["data", "demo", "robot", "scene", "state", "task", "tasks"]),
+    ("experiment", &["config", "data", "eval", "learn", "plan", "task", "tasks"]),
     (
         "cmd",
-        &["config", "data", "demo", "eval", "learn", "nn", "plan", "report", "robot", "scene", "sim", "state", "task", "tasks"],
+        &["config", "data", "demo", "eval", "experiment", "learn", "nn", "plan", "report", "robot", "scene", "sim", "state", "task", "tasks"],
     ),
     ("main", &["cmd", "nn"]),
 ];

@@ -38,6 +38,14 @@ pub const TRAIN: &str = "train";
 /// Folder of the validation root.
 pub const VALIDATION: &str = "validation";
 
+/// What a dataset root carries of its origin, read from its description alone.
+///
+/// # Errors
+/// [`crate::error::Error::Input`] when the root is no dataset or its description was changed.
+pub fn provenance(root: &Path) -> Result<Provenance> {
+    check::info(root).map(|info| info.provenance)
+}
+
 /// Writes one dataset; an older one there is replaced when the new one is whole.
 ///
 /// # Errors

@@ -21,6 +21,8 @@ use crate::config::{Alpha, TrainSettings};
 use crate::error::Result;
 use crate::learn::models::Dynamics;
 use crate::learn::run::{Hooks, Trained, run};
+use crate::words::{did_you_mean, shown};
+use std::str::FromStr;
 
 /// The methods by name.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -54,6 +56,18 @@ impl MethodName {
             MethodName::Bc => Alpha::Fixed(0.0),
             MethodName::Sc => Alpha::Fixed(1.0),
         }
+    }
+}
+
+impl FromStr for MethodName {
+    type Err = String;
+
+    fn from_str(s: &str) -> std::result::Result<Self, String> {
+        MethodName::ALL.into_iter().find(|method| method.name() == s).ok_or_else(|| {
+            let hint = did_you_mean(s, MethodName::ALL.map(MethodName::name));
+            let s = shown(s);
+            format!("unknown method \"{s}\"{hint}; allowed: hil (both losses), bc (behavior cloning), sc (state cloning)")
+        })
     }
 }
 

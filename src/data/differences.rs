@@ -1,6 +1,6 @@
 //! In which keys two settings, or two provenances, differ.
 
-use crate::data::Provenance;
+use super::Provenance;
 use serde_json::{Map, Value};
 use std::fmt;
 

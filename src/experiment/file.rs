@@ -1,0 +1,176 @@
+//! An experiment's file, checked: `pipelines/experiments/NAME.toml`.
+
+use super::seeds::Seeds;
+use super::variation::{self, Raw as RawVariation, Variation};
+use super::wording::{check_keys, check_name, distinct, is_name, not_empty, parsed};
+use crate::config::Preset;
+use crate::error::{Error, Result};
+use crate::learn::MethodName;
+use crate::task::Task;
+use crate::words::{shown, unknown};
+use serde::Deserialize;
+use std::collections::BTreeSet;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+/// Where the experiments that come with hilt are.
+pub const DIRECTORY: &str = "pipelines/experiments";
+/// A file with every key has a few kB \[bytes\].
+const LONGEST_FILE: u64 = 1 << 20;
+/// Keys of an experiment.
+const KEYS: [&str; 10] =
+    ["description", "tasks", "presets", "methods", "seeds", "episodes", "set", "dataset", "record", "variation"];
+
+/// What an experiment's file says, with names in place of words.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Experiment {
+    /// The file's name without its ending: the name of the directory of its runs.
+    pub name: String,
+    /// The file.
+    pub path: PathBuf,
+    /// What it is for.
+    pub description: String,
+    /// Tasks.
+    pub tasks: Vec<Task>,
+    /// Presets: those that come with hilt, or directories below `pipelines` with a file a task.
+    pub presets: Vec<String>,
+    /// Methods.
+    pub methods: Vec<MethodName>,
+    /// Seeds.
+    pub seeds: Vec<u64>,
+    /// Episodes of each evaluation, if not those of the preset.
+    pub episodes: Option<u64>,
+    /// Settings of all runs, over those of the preset.
+    pub set: Vec<String>,
+    /// Datasets to learn from instead of own demos; `{task}` and `{seed}` stand for those of a run.
+    pub dataset: Option<String>,
+    /// Whether evaluations are recorded, as `rollouts/`.
+    pub record: bool,
+    /// Variations; none = the plain settings.
+    pub variations: Vec<Variation>,
+}
+
+/// What the command line says instead of the file.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Overrides {
+    /// Seeds.
+    pub seeds: Option<Vec<u64>>,
+    /// Episodes of each evaluation.
+    pub episodes: Option<u64>,
+}
+
+#[derive(Deserialize)]
+struct Raw {
+    #[serde(default)]
+    description: String,
+    tasks: Vec<String>,
+    #[serde(default)]
+    presets: Option<Vec<String>>,
+    methods: Vec<String>,
+    seeds: Seeds,
+    episodes: Option<u64>,
+    #[serde(default)]
+    set: Vec<String>,
+    dataset: Option<String>,
+    #[serde(default)]
+    record: bool,
+    #[serde(default)]
+    variation: Vec<RawVariation>,
+}
+
+/// The file of an experiment: the path of a `.toml` file, or the name of one in [`DIRECTORY`].
+///
+/// # Errors
+/// [`Error::Usage`] when there is no such experiment, with the nearest name.
+pub fn find(name: &str) -> Result<PathBuf> {
+    if name.ends_with(".toml") {
+        return Ok(name.into());
+    }
+    let path = Path::new(DIRECTORY).join(format!("{name}.toml"));
+    if is_name(name) && path.is_file() {
+        return Ok(path);
+    }
+    let known: BTreeSet<String> = fs::read_dir(DIRECTORY)
+        .into_iter()
+        .flatten()
+        .flatten()
+        .filter_map(|entry| Some(entry.file_name().to_str()?.strip_suffix(".toml")?.to_string()))
+        .collect();
+    if known.is_empty() {
+        let message =
+            format!("no experiment \"{}\": there is no {DIRECTORY} here; name a file, for example mine.toml", shown(name));
+        return Err(Error::Usage(message));
+    }
+    let known: Vec<&str> = known.iter().map(String::as_str).collect();
+    Err(Error::Usage(unknown("experiment", name, &known)))
+}
+
+impl Experiment {
+    /// Reads and checks a file.
+    ///
+    /// # Errors
+    /// [`Error::Io`] when it cannot be read; [`Error::Usage`] names what is wrong in it and what is allowed.
+    pub fn read(path: &Path, overrides: &Overrides) -> Result<Self> {
+        let io = |e| Error::io(path, "read", e);
+        if fs::metadata(path).map_err(io)?.len() > LONGEST_FILE {
+            return Err(Error::Usage(format!("{}: longer than {LONGEST_FILE} bytes: no experiment", path.display())));
+        }
+        let bytes = fs::read(path).map_err(io)?;
+        let text = String::from_utf8(bytes).map_err(|_| Error::Usage(format!("{}: not UTF-8 text", path.display())))?;
+        Experiment::parse(path, &text, overrides)
+    }
+
+    /// Of the text of a file.
+    ///
+    /// # Errors
+    /// As [`Experiment::read`].
+    pub fn parse(path: &Path, text: &str, overrides: &Overrides) -> Result<Self> {
+        let name = path.file_stem().and_then(|stem| stem.to_str()).unwrap_or_default();
+        of_text(name, path, text, overrides).map_err(|why| Error::Usage(format!("{}: {why}", path.display())))
+    }
+}
+
+fn of_text(name: &str, path: &Path, text: &str, overrides: &Overrides) -> std::result::Result<Experiment, String> {
+    check_name("the experiment", name)?;
+    let table: toml::Table =
+        text.parse().map_err(|e: toml::de::Error| format!("not valid TOML: {}", e.to_string().trim_end()))?;
+    check_keys(&table, &KEYS)?;
+    if let Some(variations) = table.get("variation").and_then(toml::Value::as_array) {
+        variations.iter().filter_map(toml::Value::as_table).try_for_each(|v| check_keys(v, &variation::KEYS))?;
+    }
+    let raw: Raw = serde_path_to_error::deserialize(toml::Value::Table(table)).map_err(|e| match e.path().to_string() {
+        key if key == "." => e.inner().to_string().trim_end().to_string(),
+        key => format!("{key}: {}", e.inner().to_string().trim_end()),
+    })?;
+    let seeds = overrides.seeds.clone().map_or_else(|| raw.seeds.all(), Ok)?;
+    let presets = raw.presets.unwrap_or_else(|| vec![Preset::default().name().into()]);
+    presets.iter().try_for_each(|preset| check_name("preset", preset))?;
+    let mut experiment = Experiment {
+        name: name.into(),
+        path: path.into(),
+        description: raw.description,
+        tasks: parsed(&raw.tasks)?,
+        methods: parsed(&raw.methods)?,
+        presets,
+        seeds,
+        episodes: overrides.episodes.or(raw.episodes),
+        set: raw.set,
+        dataset: raw.dataset,
+        record: raw.record,
+        variations: Vec::new(),
+    };
+    for list in [("tasks", experiment.tasks.len()), ("methods", experiment.methods.len()), ("presets", experiment.presets.len())]
+    {
+        not_empty(list)?;
+    }
+    not_empty(("seeds", experiment.seeds.len()))?;
+    distinct("tasks", &raw.tasks)?;
+    distinct("methods", &raw.methods)?;
+    distinct("presets", &experiment.presets)?;
+    for variation in &raw.variation {
+        let checked = variation.check(&experiment).map_err(|why| format!("variation \"{}\": {why}", shown(&variation.name)))?;
+        experiment.variations.push(checked);
+    }
+    distinct("variations", &raw.variation.iter().map(|v| v.name.clone()).collect::<Vec<_>>())?;
+    Ok(experiment)
+}

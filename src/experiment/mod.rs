@@ -1,0 +1,28 @@
+//! Experiments as data: a file with a grid of tasks, presets, variations, methods and seeds becomes the commands of `plan` to `evaluate`, each once.
+//!
+//! [`Experiment`] is what the file says, [`Grid`] its runs and the [`Step`]s that they share. A step is a command line with inputs and outputs;
+//! whether it is done, its artefact says ([`state`]). Another program can run the steps as well ([`emit`]); this module starts none.
+
+mod builder;
+pub mod emit;
+pub mod estimate;
+mod file;
+mod grid;
+pub mod leftovers;
+mod place;
+mod resolve;
+pub mod results;
+mod seeds;
+pub mod state;
+mod step;
+mod variation;
+mod wording;
+
+pub use file::{Experiment, Overrides, find};
+pub use grid::{Grid, Run};
+pub use seeds::{Seeds, seeds_of};
+pub use step::{Input, Output, Step};
+pub use variation::Variation;
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,130 @@
+//! The settings of every stage for one task, preset and variation.
+
+use super::file::Experiment;
+use super::variation::Variation;
+use crate::config::{Pipeline, Preset, Source, Stage};
+use crate::error::{Error, Result};
+use crate::learn::MethodName;
+use crate::plan::check_ready_pose;
+use crate::task::Task;
+use crate::words::{shown, unknown};
+use serde_json::Value;
+use std::collections::BTreeSet;
+use std::fs;
+use std::path::Path;
+
+/// Where presets that do not come with hilt are, a directory each.
+const PIPELINES: &str = "pipelines";
+/// Keys without effect on behavior cloning: what state cloning, the mixture and the dynamics network are set by. A dot or underscore ends a family.
+const NOT_OF_BC: [&str; 6] =
+    ["pretrain.", "train.alpha", "train.rho", "train.sc_", "train.fine_tune_dynamics", "train.dynamics_"];
+/// Keys without effect on state cloning alone.
+const NOT_OF_SC: [&str; 3] = ["train.alpha", "train.warm_start_", "train.bc_batch"];
+
+/// What one stage does in a cell of the grid.
+#[derive(Clone, Debug)]
+pub struct StageSettings {
+    /// The flags that name the settings.
+    pub words: Vec<String>,
+    /// What the stage reads of them, as its provenance has it.
+    pub json: Value,
+    /// All of them.
+    pub pipeline: Pipeline,
+}
+
+/// The settings of all stages, by their order.
+pub type Cell = [StageSettings; 6];
+
+/// The settings of `task` under a preset, with a variation's over them.
+///
+/// # Errors
+/// [`Error::Usage`] names what is wrong and where.
+pub fn cell(experiment: &Experiment, task: Task, preset: &str, variation: Option<&Variation>) -> Result<Cell> {
+    let at = match variation {
+        Some(variation) => format!("{}: variation \"{}\"", experiment.path.display(), variation.name),
+        None => experiment.path.display().to_string(),
+    };
+    let says = |why: Error| match why {
+        Error::Usage(why) => Error::Usage(format!("{at}: {why}")),
+        other => other,
+    };
+    variation.map_or(Ok(()), check_variation).map_err(|why| Error::Usage(format!("{at}: {why}")))?;
+    let (source, words) = source_of(task, preset).map_err(|why| Error::Usage(format!("{at}: {why}")))?;
+    let stages = Stage::ALL.map(|stage| stage_settings(experiment, stage, &source, &words, variation));
+    let mut resolved = Vec::with_capacity(Stage::ALL.len());
+    for stage in stages {
+        resolved.push(stage.map_err(says)?);
+    }
+    Ok(resolved.try_into().expect("a stage each"))
+}
+
+fn stage_settings(
+    experiment: &Experiment,
+    stage: Stage,
+    source: &Source,
+    words: &[String],
+    variation: Option<&Variation>,
+) -> Result<StageSettings> {
+    let own = variation.filter(|v| v.stages.contains(&stage)).map(|v| v.set.as_slice()).unwrap_or_default();
+    let episodes = experiment.episodes.map(|n| format!("evaluate.episodes={n}"));
+    let sets: Vec<String> = experiment.set.iter().chain(&episodes).chain(own).cloned().collect();
+    let pipeline = Pipeline::load(source, &sets)?;
+    check_ready_pose(&pipeline.scene)?;
+    // What another stage reads changes nothing here.
+    let read = sets.iter().filter(|set| stage.sections().contains(&section_of(set)));
+    let words = words.iter().cloned().chain(read.flat_map(|set| ["--set".to_string(), set.clone()])).collect();
+    Ok(StageSettings { words, json: pipeline.to_json(stage)?, pipeline })
+}
+
+/// `train.rho=0.3` is of `train`.
+fn section_of(set: &str) -> &str {
+    set.split(['.', '=']).next().unwrap_or_default().trim()
+}
+
+fn source_of(task: Task, preset: &str) -> std::result::Result<(Source, Vec<String>), String> {
+    let name = task.name().to_string();
+    if let Ok(known) = preset.parse::<Preset>() {
+        let words = ["--task".to_string(), name, "--preset".into(), preset.into()];
+        let words = if known == Preset::default() { words[..2].to_vec() } else { words.to_vec() };
+        return Ok((Source::BuiltIn(task, known), words));
+    }
+    let path = Path::new(PIPELINES).join(preset).join(format!("{task}.toml"));
+    if path.is_file() {
+        let words = vec!["--pipeline".into(), path.display().to_string(), "--task".into(), name];
+        return Ok((Source::File(path, Some(task)), words));
+    }
+    let has_file = |dir: &Path| dir.join(format!("{task}.toml")).is_file();
+    let entries = fs::read_dir(PIPELINES).into_iter().flatten().flatten();
+    let own = entries.filter(|e| has_file(&e.path())).filter_map(|e| e.file_name().to_str().map(String::from));
+    let known: BTreeSet<String> = own.chain(Preset::ALL.map(|p| p.name().into())).collect();
+    let known: Vec<&str> = known.iter().map(String::as_str).collect();
+    Err(format!("{} (there is no {})", unknown("preset", preset, &known), path.display()))
+}
+
+/// Every setting of a variation must be read by one of its stages, and do something for each of its methods.
+fn check_variation(variation: &Variation) -> std::result::Result<(), String> {
+    for set in &variation.set {
+        let section = section_of(set);
+        let is_section = Stage::ALL.iter().any(|stage| stage.sections().contains(&section));
+        if is_section && !variation.stages.iter().any(|stage| stage.sections().contains(&section)) {
+            let stages: Vec<&str> = variation.stages.iter().map(|s| s.name()).collect();
+            return Err(format!("set \"{}\" is read by none of its stages ({})", shown(set), stages.join(", ")));
+        }
+    }
+    let without_effect = |method: MethodName| match method {
+        MethodName::Hil => false,
+        MethodName::Bc => all_of(&variation.set, &NOT_OF_BC),
+        MethodName::Sc => all_of(&variation.set, &NOT_OF_SC),
+    };
+    match variation.methods.iter().find(|method| without_effect(**method)) {
+        Some(method) => {
+            let (method, set) = (method.name(), shown(&variation.set.join(" ")));
+            Err(format!("\"{set}\" changes nothing of method {method}: limit the variation by methods = [...]"))
+        }
+        None => Ok(()),
+    }
+}
+
+fn all_of(set: &[String], families: &[&str]) -> bool {
+    !set.is_empty() && set.iter().all(|set| families.iter().any(|family| set.trim_start().starts_with(family)))
+}

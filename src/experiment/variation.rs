@@ -1,0 +1,81 @@
+//! A variation of an experiment.
+
+use super::file::Experiment;
+use super::wording::{check_name, not_empty, parsed};
+use crate::config::Stage;
+use crate::learn::MethodName;
+use crate::task::Task;
+use crate::words::unknown;
+use serde::Deserialize;
+
+/// Keys of a variation.
+pub(super) const KEYS: [&str; 6] = ["name", "extends", "set", "stages", "tasks", "methods"];
+/// Files and directories, their endings aside, that stand where the name of a variation would.
+const TAKEN: [&str; 6] = ["plans", "recordings", "dataset", "dynamics", "logs", "rollouts"];
+
+/// A named change of settings.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Variation {
+    /// Its name, a directory's.
+    pub name: String,
+    /// Settings, over all others.
+    pub set: Vec<String>,
+    /// Stages that they hold for.
+    pub stages: Vec<Stage>,
+    /// Tasks that have it.
+    pub tasks: Vec<Task>,
+    /// Methods that have it.
+    pub methods: Vec<MethodName>,
+}
+
+/// As a file has it.
+#[derive(Deserialize)]
+pub(super) struct Raw {
+    pub(super) name: String,
+    /// An earlier variation, whose settings come first.
+    extends: Option<String>,
+    #[serde(default)]
+    set: Vec<String>,
+    stages: Option<Vec<String>>,
+    tasks: Option<Vec<String>>,
+    methods: Option<Vec<String>>,
+}
+
+impl Raw {
+    /// With names in place of words.
+    ///
+    /// # Errors
+    /// What is wrong, in words.
+    pub(super) fn check(&self, of: &Experiment) -> std::result::Result<Variation, String> {
+        check_name("the name", &self.name)?;
+        let method = MethodName::ALL.map(MethodName::name).contains(&self.name.as_str());
+        let stem = self.name.split('.').next().unwrap_or_default();
+        if method || TAKEN.contains(&stem) {
+            return Err("this name is taken by another directory of a run; choose another".into());
+        }
+        let stages = self.stages.as_ref().map_or(Ok(Stage::ALL.to_vec()), |words| parsed(words))?;
+        let tasks = self.tasks.as_ref().map_or(Ok(of.tasks.clone()), |words| parsed(words))?;
+        let methods = self.methods.as_ref().map_or(Ok(of.methods.clone()), |words| parsed(words))?;
+        for list in [("stages", stages.len()), ("tasks", tasks.len()), ("methods", methods.len())] {
+            not_empty(list)?;
+        }
+        let foreign = tasks.iter().filter(|t| !of.tasks.contains(t)).map(|t| format!("task {t}"));
+        let foreign = foreign.chain(methods.iter().filter(|m| !of.methods.contains(m)).map(|m| format!("method {}", m.name())));
+        if let Some(foreign) = foreign.into_iter().next() {
+            return Err(format!("{foreign} is none of the experiment's; add it there too"));
+        }
+        let mut set = match &self.extends {
+            Some(name) => earlier(name, of)?,
+            None => Vec::new(),
+        };
+        set.extend(self.set.iter().cloned());
+        Ok(Variation { name: self.name.clone(), set, stages, tasks, methods })
+    }
+}
+
+/// The settings of a variation that stands before.
+fn earlier(name: &str, of: &Experiment) -> std::result::Result<Vec<String>, String> {
+    let found = of.variations.iter().find(|v| v.name == name).map(|v| v.set.clone());
+    let known: Vec<&str> = of.variations.iter().map(|v| v.name.as_str()).collect();
+    found.ok_or_else(|| format!("extends: {} (only those before it)", unknown("variation", name, &known)))
+}

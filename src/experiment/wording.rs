@@ -1,0 +1,51 @@
+//! Words of an experiment's file: names, keys and lists, and what is wrong with them.
+
+use crate::config::Stage;
+use crate::words::{did_you_mean, shown, unknown};
+use std::collections::BTreeSet;
+
+/// A directory's name is shorter than 256 bytes everywhere; nobody types so many.
+const LONGEST_NAME: usize = 64;
+
+pub(super) fn parsed<T: std::str::FromStr<Err = String>>(words: &[String]) -> std::result::Result<Vec<T>, String> {
+    words.iter().map(|word| word.parse()).collect()
+}
+
+pub(super) fn check_keys(table: &toml::Table, known: &[&str]) -> std::result::Result<(), String> {
+    match table.keys().find(|key| !known.contains(&key.as_str())) {
+        Some(key) if key.contains('.') || Stage::ALL.iter().any(|stage| stage.name() == key) => {
+            let hint = did_you_mean(key, known.iter().copied());
+            Err(format!("unknown key \"{}\"{hint}; settings go into set = [\"stage.key=value\"]", shown(key)))
+        }
+        Some(key) => Err(unknown("key", key, known)),
+        None => Ok(()),
+    }
+}
+
+/// What can be a directory's name everywhere, also where letters have no case.
+pub(super) fn is_name(name: &str) -> bool {
+    let letters = name.bytes().all(|b| b.is_ascii_lowercase() || b.is_ascii_digit() || b"._-".contains(&b));
+    letters && name.starts_with(|c: char| c.is_ascii_alphanumeric()) && name.len() <= LONGEST_NAME
+}
+
+pub(super) fn check_name(what: &str, name: &str) -> std::result::Result<(), String> {
+    if is_name(name) {
+        return Ok(());
+    }
+    let name = shown(name);
+    Err(format!(
+        "{what} \"{name}\" is no name of a directory: up to {LONGEST_NAME} small letters, digits, dots, - and _, a letter or digit first"
+    ))
+}
+
+pub(super) fn not_empty((list, len): (&str, usize)) -> std::result::Result<(), String> {
+    if len == 0 { Err(format!("{list} are empty: there is nothing to run")) } else { Ok(()) }
+}
+
+pub(super) fn distinct(list: &str, names: &[String]) -> std::result::Result<(), String> {
+    let mut seen = BTreeSet::new();
+    match names.iter().find(|name| !seen.insert(name.as_str())) {
+        Some(twice) => Err(format!("{list}: \"{}\" is there twice", shown(twice))),
+        None => Ok(()),
+    }
+}
