@@ -78,7 +78,7 @@ struct Raw {
     variation: Vec<RawVariation>,
 }
 
-/// The file of an experiment: the path of a `.toml` file, or the name of one in [`DIRECTORY`].
+/// The file of an experiment: the path of a `.toml` file, or the name of one in `pipelines/experiments`.
 ///
 /// # Errors
 /// [`Error::Usage`] when there is no such experiment, with the nearest name.

@@ -109,8 +109,8 @@ EOF
 }
 
 kills=5
-# A random part of so many seconds, those of an undisturbed run.
-random() { awk -v most="$1" -v n="$RANDOM" 'BEGIN { printf "%.2f\n", 0.5 + n / 32768 * most }'; }
+# A moment in the first half or so of as many seconds as an undisturbed run takes: the later kills find work too.
+random() { awk -v most="$1" -v n="$RANDOM" 'BEGIN { printf "%.2f\n", 0.5 + 0.6 * n / 32768 * most }'; }
 
 snakemake() { "$venv/bin/snakemake" --cores "$threads" --snakefile runs/experiments/tiny/Snakefile "$@" >> snakemake.log 2>&1; }
 

@@ -31,7 +31,7 @@ fn a_changed_experiment_is_refused_by_name_and_a_grown_one_goes_on() {
 #[test]
 fn a_training_that_was_stopped_does_not_go_on_as_another() {
     let long = TINY
-        .replace("warm_start_updates=10", "warm_start_updates=10000000")
+        .replace("warm_start_updates=10", "bc_batch=64\", \"train.warm_start_updates=20000")
         .replace("methods = [\"hil\", \"bc\"]", "methods = [\"hil\"]");
     let sweep = Sweep::new(&long);
     let child = sweep.start(&["--seeds", "11"]);
@@ -41,6 +41,7 @@ fn a_training_that_was_stopped_does_not_go_on_as_another() {
     while !at_work() && began.elapsed().as_secs() < 60 {
         std::thread::sleep(std::time::Duration::from_millis(20));
     }
+    assert!(at_work(), "the training has not begun");
     crate::ends::signal(&child, "TERM");
     let output = child.wait_with_output().expect("ended");
     assert_eq!(output.status.code(), Some(143));

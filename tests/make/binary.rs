@@ -99,5 +99,5 @@ fn help_needs_no_column() {
     only(&bin, &["make", "awk", "bash", "nproc"]);
     let output = command(run.tree.path(), &["help"]).env("PATH", &bin).output().expect("make runs");
     let said = text(&output.stdout);
-    assert!(output.status.success() && said.contains("\n  clean-runs  remove what was made"), "{said}{}", text(&output.stderr));
+    assert!(output.status.success() && said.contains("\n  clean-runs   remove what was made"), "{said}{}", text(&output.stderr));
 }
