@@ -1,12 +1,11 @@
 //! From settings to steps: each is made once, and lies with the first run that needs it.
 
 use super::estimate;
-use super::file::Experiment;
-use super::grid::Run;
 use super::place::{artefact_of, outputs_of};
 use super::resolve::{Cell, StageSettings};
+use super::runs::Run;
+use super::spec::{Experiment, Variation};
 use super::step::{Input, Step};
-use super::variation::Variation;
 use crate::config::Stage;
 use crate::data::Provenance;
 use crate::data::origin::Kind;

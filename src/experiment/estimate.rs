@@ -1,6 +1,6 @@
 //! How long steps take: by the wall times of finished ones of the same stage and task, otherwise by rates that were measured once.
 
-use super::grid::Grid;
+use super::runs::Grid;
 use super::state::State;
 use super::step::Step;
 use crate::config::{Pipeline, Stage};

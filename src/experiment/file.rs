@@ -1,12 +1,11 @@
 //! An experiment's file, checked: `pipelines/experiments/NAME.toml`.
 
 use super::seeds::Seeds;
-use super::variation::{self, Raw as RawVariation, Variation};
+use super::spec::{Experiment, Overrides};
+use super::variation::{self, Raw as RawVariation};
 use super::wording::{check_keys, check_name, distinct, is_name, not_empty, parsed};
 use crate::config::Preset;
 use crate::error::{Error, Result};
-use crate::learn::MethodName;
-use crate::task::Task;
 use crate::words::{shown, unknown};
 use serde::Deserialize;
 use std::collections::BTreeSet;
@@ -20,44 +19,6 @@ const LONGEST_FILE: u64 = 1 << 20;
 /// Keys of an experiment.
 const KEYS: [&str; 10] =
     ["description", "tasks", "presets", "methods", "seeds", "episodes", "set", "dataset", "record", "variation"];
-
-/// What an experiment's file says, with names in place of words.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Experiment {
-    /// The file's name without its ending: the name of the directory of its runs.
-    pub name: String,
-    /// The file.
-    pub path: PathBuf,
-    /// What it is for.
-    pub description: String,
-    /// Tasks.
-    pub tasks: Vec<Task>,
-    /// Presets: those that come with hilt, or directories below `pipelines` with a file a task.
-    pub presets: Vec<String>,
-    /// Methods.
-    pub methods: Vec<MethodName>,
-    /// Seeds.
-    pub seeds: Vec<u64>,
-    /// Episodes of each evaluation, if not those of the preset.
-    pub episodes: Option<u64>,
-    /// Settings of all runs, over those of the preset.
-    pub set: Vec<String>,
-    /// Datasets to learn from instead of own demos; `{task}` and `{seed}` stand for those of a run.
-    pub dataset: Option<String>,
-    /// Whether evaluations are recorded, as `rollouts/`.
-    pub record: bool,
-    /// Variations; none = the plain settings.
-    pub variations: Vec<Variation>,
-}
-
-/// What the command line says instead of the file.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Overrides {
-    /// Seeds.
-    pub seeds: Option<Vec<u64>>,
-    /// Episodes of each evaluation.
-    pub episodes: Option<u64>,
-}
 
 #[derive(Deserialize)]
 struct Raw {

@@ -1,46 +1,15 @@
 //! From an experiment to its runs and the steps that they share.
 
 use super::builder::{At, Builder};
-use super::file::Experiment;
 use super::resolve::cell;
-use super::step::Step;
-use super::variation::Variation;
+use super::runs::{Grid, Run};
+use super::spec::{Experiment, Variation};
 use crate::error::{Error, Result};
-use crate::learn::MethodName;
-use crate::task::Task;
 use std::collections::HashMap;
 use std::path::Path;
 
 /// More runs than one machine does in a year.
 const MOST_RUNS: usize = 100_000;
-
-/// One policy and its evaluation: a row of the results.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Run {
-    /// The task.
-    pub task: Task,
-    /// The preset.
-    pub preset: String,
-    /// The variation; empty = the plain settings.
-    pub variation: String,
-    /// The method.
-    pub method: MethodName,
-    /// The seed.
-    pub seed: u64,
-    /// The step that trains, by its place among the steps.
-    pub train: usize,
-    /// The step that evaluates.
-    pub evaluate: usize,
-}
-
-/// All of an experiment.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Grid {
-    /// Its commands, each after those that it needs; seed by seed, so that a first comparison is there early.
-    pub steps: Vec<Step>,
-    /// Its runs, in the order of the file: task, preset, variation, method, seed.
-    pub runs: Vec<Run>,
-}
 
 impl Grid {
     /// The runs of an experiment whose files go below `dir`.

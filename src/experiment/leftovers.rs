@@ -1,7 +1,7 @@
 //! Artefacts in an experiment's directory that none of its runs makes: the experiment was changed after it had begun.
 
-use super::grid::Grid;
 use super::place::artefact_of;
+use super::runs::Grid;
 use crate::config::Stage;
 use crate::error::{Error, Result};
 use std::collections::HashSet;

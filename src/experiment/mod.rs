@@ -12,17 +12,19 @@ pub mod leftovers;
 mod place;
 mod resolve;
 pub mod results;
+mod runs;
 mod seeds;
+mod spec;
 pub mod state;
 mod step;
 mod variation;
 mod wording;
 
-pub use file::{Experiment, Overrides, find};
-pub use grid::{Grid, Run};
+pub use file::find;
+pub use runs::{Grid, Run};
 pub use seeds::{Seeds, seeds_of};
+pub use spec::{Experiment, Overrides, Variation};
 pub use step::{Input, Output, Step};
-pub use variation::Variation;
 
 #[cfg(test)]
 mod tests;

@@ -1,7 +1,6 @@
 //! The settings of every stage for one task, preset and variation.
 
-use super::file::Experiment;
-use super::variation::Variation;
+use super::spec::{Experiment, Variation};
 use crate::config::{Pipeline, Preset, Source, Stage};
 use crate::error::{Error, Result};
 use crate::learn::MethodName;

@@ -2,7 +2,7 @@
 //! their own.
 
 use super::estimate::wall_s_of;
-use super::grid::{Grid, Run};
+use super::runs::{Grid, Run};
 use super::state::Contents;
 use super::step::Step;
 use crate::data::{json_file, table_file};

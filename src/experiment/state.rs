@@ -1,8 +1,8 @@
 //! What of an experiment is done: an artefact that is there and says that it was made with the step's settings and seed from the inputs that
 //! are there. Times of files say nothing.
 
-use super::grid::Grid;
 use super::place::checkpoint_of;
+use super::runs::Grid;
 use super::step::Step;
 use crate::config::Stage;
 use crate::data::differences::first_difference;

@@ -1,10 +1,9 @@
-//! A variation of an experiment.
+//! A variation as a file has it, checked.
 
-use super::file::Experiment;
+use super::spec::{Experiment, Variation};
 use super::wording::{check_name, not_empty, parsed};
 use crate::config::Stage;
 use crate::learn::MethodName;
-use crate::task::Task;
 use crate::words::unknown;
 use serde::Deserialize;
 
@@ -12,21 +11,6 @@ use serde::Deserialize;
 pub(super) const KEYS: [&str; 6] = ["name", "extends", "set", "stages", "tasks", "methods"];
 /// Files and directories, their endings aside, that stand where the name of a variation would.
 const TAKEN: [&str; 6] = ["plans", "recordings", "dataset", "dynamics", "logs", "rollouts"];
-
-/// A named change of settings.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Variation {
-    /// Its name, a directory's.
-    pub name: String,
-    /// Settings, over all others.
-    pub set: Vec<String>,
-    /// Stages that they hold for.
-    pub stages: Vec<Stage>,
-    /// Tasks that have it.
-    pub tasks: Vec<Task>,
-    /// Methods that have it.
-    pub methods: Vec<MethodName>,
-}
 
 /// As a file has it.
 #[derive(Deserialize)]

@@ -68,18 +68,21 @@ fn expand(tree: &str) -> Vec<Vec<String>> {
     paths
 }
 
-/// The statements that import, each whether it hands on, and its tree.
-fn statements(code: &str) -> Vec<(bool, &str)> {
-    let mut found = Vec::new();
+/// The statements that import, each whether it hands on, and its tree; and the code without them.
+fn statements(code: &str) -> (Vec<(bool, &str)>, String) {
+    let (mut found, mut rest, mut done) = (Vec::new(), String::new(), 0);
     for (at, _) in code.match_indices("use ") {
-        let line = &code[code[..at].rfind('\n').map_or(0, |n| n + 1)..at];
-        let before = line.trim();
-        let end = code[at..].find(';').map_or(code.len(), |n| at + n);
-        if before.is_empty() || before.starts_with("pub") {
-            found.push((before.starts_with("pub"), &code[at + "use ".len()..end]));
+        let before = code[code[..at].rfind('\n').map_or(0, |n| n + 1)..at].trim();
+        if at < done || !(before.is_empty() || before.starts_with("pub")) {
+            continue;
         }
+        let end = code[at..].find(';').map_or(code.len(), |n| at + n);
+        found.push((before.starts_with("pub"), &code[at + "use ".len()..end]));
+        rest.push_str(&code[done..at]);
+        done = end;
     }
-    found
+    rest.push_str(&code[done..]);
+    (found, rest)
 }
 
 /// The paths in the code itself: `super::kernel::choose`, `tiles::product`.
@@ -99,15 +102,17 @@ impl Imports {
         imports.files.retain(|module, _| *module != ["lib"] && *module != ["main"]);
         let codes: Vec<(Module, String)> = imports.files.iter().map(|(module, path)| (module.clone(), code(path))).collect();
         for (module, code) in &codes {
-            for path in statements(code).into_iter().filter(|(hands_on, _)| *hands_on).flat_map(|(_, tree)| expand(tree)) {
+            let handed_on = statements(code).0.into_iter().filter(|(hands_on, _)| *hands_on);
+            for path in handed_on.flat_map(|(_, tree)| expand(tree)) {
                 if let (Some(from), Some(name)) = (imports.absolute(module, &path), path.last()) {
                     imports.reexports.insert((module.clone(), name.clone()), from);
                 }
             }
         }
         for (module, code) in &codes {
-            let trees = statements(code).into_iter().filter(|(hands_on, _)| !hands_on).flat_map(|(_, tree)| expand(tree));
-            let known: Vec<Vec<String>> = trees.chain(paths_in(code)).collect();
+            let (imported, rest) = statements(code);
+            let trees = imported.into_iter().filter(|(hands_on, _)| !hands_on).flat_map(|(_, tree)| expand(tree));
+            let known: Vec<Vec<String>> = trees.chain(paths_in(&rest)).collect();
             let homes = known.iter().filter_map(|path| imports.home(imports.absolute(module, path)?, 0));
             let edges = homes.filter(|home| home != module).collect();
             imports.edges.insert(module.clone(), edges);

@@ -1,6 +1,7 @@
 //! What is printed and written beside the runs: plans of work, results, workflows.
 
-use super::{Checked, Program};
+use super::args::Program;
+use super::checked::Checked;
 use crate::cmd::{Context, output};
 use crate::data::atomic;
 use crate::error::{Error, Result};

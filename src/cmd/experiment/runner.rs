@@ -1,7 +1,8 @@
 //! Runs the steps that are not done, several side by side, each as soon as those that it needs are done.
 
+use super::checked::Checked;
 use super::lock::Lock;
-use super::{Checked, child, output};
+use super::{child, output};
 use crate::cmd::{Context, Outcome};
 use crate::data::ContentHash;
 use crate::error::{Error, Result};

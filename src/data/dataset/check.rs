@@ -73,8 +73,8 @@ fn no_dataset(root: &Path) -> String {
         return "does not exist; hilt convert makes datasets".into();
     }
     let inner = |name: &str| root.join(name).join(INFO).is_file();
-    if inner(super::TRAIN) || inner(super::VALIDATION) {
-        return format!("holds the two datasets {} and {}; name one of them", super::TRAIN, super::VALIDATION);
+    if inner(super::meta::TRAIN) || inner(super::meta::VALIDATION) {
+        return format!("holds the two datasets {} and {}; name one of them", super::meta::TRAIN, super::meta::VALIDATION);
     }
     format!("is no dataset: {INFO} is missing")
 }

@@ -17,6 +17,10 @@ use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::Arc;
 
+/// Folder of the training root.
+pub const TRAIN: &str = "train";
+/// Folder of the validation root.
+pub const VALIDATION: &str = "validation";
 /// The layout that LeRobot 0.6 reads.
 pub(super) const CODEBASE_VERSION: &str = "v3.0";
 pub(super) const INFO: &str = "meta/info.json";

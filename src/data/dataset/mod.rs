@@ -22,6 +22,7 @@ mod whole;
 mod write;
 
 pub use episode::{DatasetEpisode, Episodes};
+pub use meta::{TRAIN, VALIDATION};
 pub use read::{Dataset, Description, each, read, read_for};
 pub use split::split;
 pub use twins::{Fingerprint, first_shared, first_twins};
@@ -32,11 +33,6 @@ use crate::interrupt::Interrupt;
 use crate::task::Task;
 use std::path::Path;
 use write::Content;
-
-/// Folder of the training root.
-pub const TRAIN: &str = "train";
-/// Folder of the validation root.
-pub const VALIDATION: &str = "validation";
 
 /// What a dataset root carries of its origin, read from its description alone.
 ///

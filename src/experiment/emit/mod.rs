@@ -6,7 +6,7 @@ mod snakemake;
 pub use slurm::slurm;
 pub use snakemake::snakemake;
 
-use super::grid::Grid;
+use super::runs::Grid;
 use super::state::State;
 use serde_json::{Value, json};
 use std::path::Path;

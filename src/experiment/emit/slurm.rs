@@ -1,6 +1,6 @@
 //! A script for Slurm: a job array a stage, each after the one before.
 
-use super::super::grid::Grid;
+use super::super::runs::Grid;
 use super::super::step::Step;
 use super::{MARK, Site, line, quoted};
 use crate::config::Stage;

@@ -1,7 +1,7 @@
 //! A workflow for Snakemake 8 and newer, which runs it on this machine, on Slurm or on Kubernetes by executors of its own.
 
-use super::super::grid::Grid;
 use super::super::results::RESULTS;
+use super::super::runs::Grid;
 use super::super::step::{Output, Step};
 use super::{MARK, Site, line};
 use std::fmt::Write;

@@ -1,0 +1,59 @@
+//! What an experiment is.
+
+use crate::config::Stage;
+use crate::learn::MethodName;
+use crate::task::Task;
+use std::path::PathBuf;
+
+/// What an experiment's file says, with names in place of words.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Experiment {
+    /// The file's name without its ending: the name of the directory of its runs.
+    pub name: String,
+    /// The file.
+    pub path: PathBuf,
+    /// What it is for.
+    pub description: String,
+    /// Tasks.
+    pub tasks: Vec<Task>,
+    /// Presets: those that come with hilt, or directories below `pipelines` with a file a task.
+    pub presets: Vec<String>,
+    /// Methods.
+    pub methods: Vec<MethodName>,
+    /// Seeds.
+    pub seeds: Vec<u64>,
+    /// Episodes of each evaluation, if not those of the preset.
+    pub episodes: Option<u64>,
+    /// Settings of all runs, over those of the preset.
+    pub set: Vec<String>,
+    /// Datasets to learn from instead of own demos; `{task}` and `{seed}` stand for those of a run.
+    pub dataset: Option<String>,
+    /// Whether evaluations are recorded, as `rollouts/`.
+    pub record: bool,
+    /// Variations; none = the plain settings.
+    pub variations: Vec<Variation>,
+}
+
+/// What the command line says instead of the file.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Overrides {
+    /// Seeds.
+    pub seeds: Option<Vec<u64>>,
+    /// Episodes of each evaluation.
+    pub episodes: Option<u64>,
+}
+
+/// A named change of settings.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Variation {
+    /// Its name, a directory's.
+    pub name: String,
+    /// Settings, over all others.
+    pub set: Vec<String>,
+    /// Stages that they hold for.
+    pub stages: Vec<Stage>,
+    /// Tasks that have it.
+    pub tasks: Vec<Task>,
+    /// Methods that have it.
+    pub methods: Vec<MethodName>,
+}
