@@ -25,8 +25,8 @@
 //!
 //! A module imports only from those before it; `tests/architecture.rs` holds this, and which modules see which.
 //!
-//! - contracts that all may use: [`state`], [`demo`], [`scene`], [`config`], [`pulse`], [`table`], [`tensor`], [`error`], [`guard`],
-//!   [`interrupt`], [`math`], [`seed`], [`words`]
+//! - contracts that all may use: [`state`], [`demo`], [`scene`], [`mod@env`], [`config`], [`pulse`], [`table`], [`tensor`], [`error`],
+//!   [`guard`], [`interrupt`], [`math`], [`seed`], [`words`]
 //! - [`tasks`], [`robot`], then [`plan`] (scene to demonstration) and [`sim`] (contact physics, the only home of rapier)
 //! - [`data`]: files, the only home of MCAP, Arrow, Parquet and safetensors; knows no learning
 //! - [`nn`] (networks and their engine, knows no robots), then [`learn`] (the method, knows neither files nor simulator)
@@ -38,6 +38,7 @@ pub mod cmd;
 pub mod config;
 pub mod data;
 pub mod demo;
+pub mod env;
 pub mod error;
 pub mod eval;
 pub mod guard;

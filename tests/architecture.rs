@@ -5,8 +5,22 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// What any module may use: contracts, errors, randomness, settings.
-const EVERYWHERE: [&str; 13] =
-    ["config", "demo", "error", "guard", "interrupt", "math", "pulse", "scene", "seed", "state", "table", "tensor", "words"];
+const EVERYWHERE: [&str; 14] = [
+    "config",
+    "demo",
+    "env",
+    "error",
+    "guard",
+    "interrupt",
+    "math",
+    "pulse",
+    "scene",
+    "seed",
+    "state",
+    "table",
+    "tensor",
+    "words",
+];
 
 /// What else each module may use. A module that is not here is refused, so that a new one gets its place on purpose.
 const FLOW: [(&str, &[&str]); 18] = [

@@ -12,6 +12,7 @@ mod inspect;
 mod output;
 mod places;
 mod plan;
+mod ppo;
 mod pretrain;
 mod render;
 mod settings;

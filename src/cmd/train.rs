@@ -25,10 +25,10 @@ pub const KIND: &str = "policy";
 #[derive(Debug, clap::Args)]
 pub struct Args {
     #[command(flatten)]
-    settings: SettingsArgs,
-    /// Method: hil, bc or sc
+    pub settings: SettingsArgs,
+    /// Method: hil, bc, sc or ppo (reinforcement learning in the simulator, without a dataset)
     #[arg(long, value_name = "METHOD", default_value = "hil", value_parser = method)]
-    method: Method,
+    method: Teacher,
     /// State recovery probability, 0 to 1 [default: train.rho]
     #[arg(long, value_name = "RHO", allow_negative_numbers = true)]
     rho: Option<f64>,
@@ -43,29 +43,39 @@ pub struct Args {
     dynamics: Option<PathBuf>,
     /// Weights to write [default: runs/<TASK>/policy.safetensors, of another method than hil policy-<METHOD>.safetensors]
     #[arg(long, value_name = "FILE.safetensors")]
-    out: Option<PathBuf>,
+    pub out: Option<PathBuf>,
     /// Metrics per epoch to write [default: beside the weights, their name with .training.parquet]
     #[arg(long, value_name = "FILE.parquet")]
-    metrics: Option<PathBuf>,
+    pub metrics: Option<PathBuf>,
     /// Continue an interrupted run of the same settings from its checkpoint beside the weights, <name>.checkpoint.safetensors; the log goes on too
     #[arg(long)]
     pub resume: bool,
     /// Time between two checkpoints; 0 = only when training is interrupted
     #[arg(long, value_name = "SECONDS", default_value_t = 60)]
-    checkpoint_every: u64,
+    pub checkpoint_every: u64,
+}
+
+/// What a policy learns from.
+#[derive(Clone, Copy, Debug)]
+enum Teacher {
+    Demos(Method),
+    Rewards,
 }
 
 pub fn run(args: &Args, context: &Context) -> Result<Outcome> {
     let pipeline =
         args.settings.resolve(&[("train.rho", args.rho.map(|v| v.to_string())), ("train.alpha", args.alpha.clone())])?;
+    let Teacher::Demos(taught) = args.method else {
+        return super::ppo::run(args, &pipeline, context);
+    };
     let dir = path_or(args.dataset.as_deref(), pipeline.task, "dataset");
     let model = path_or(args.dynamics.as_deref(), pipeline.task, "dynamics.safetensors");
-    let method = format!("{:?}", args.method).to_lowercase();
+    let method = format!("{taught:?}").to_lowercase();
     // As `make all METHOD=bc` has it: another method replaces no policy of hil.
-    let name = if args.method == Method::Hil { "policy.safetensors".into() } else { format!("policy-{method}.safetensors") };
+    let name = if taught == Method::Hil { "policy.safetensors".into() } else { format!("policy-{method}.safetensors") };
     let out = path_or(args.out.as_deref(), pipeline.task, &name);
     let metrics = args.metrics.clone().unwrap_or_else(|| beside(&out, "training.parquet"));
-    let needs_model = args.method != Method::Bc || args.dynamics.is_some();
+    let needs_model = taught != Method::Bc || args.dynamics.is_some();
     let kept = beside(&out, checkpoint::ENDING);
     let places = args.settings.places().read(&dir).read_all(needs_model.then_some(model.as_path()));
     let places =
@@ -91,7 +101,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome> {
         resume,
         interrupt: &context.interrupt,
     };
-    let trained = train(args.method, demos, validation, dynamics, &pipeline.train, seed, hooks);
+    let trained = train(taught, demos, validation, dynamics, &pipeline.train, seed, hooks);
     let trained = trained.map_err(|why| keeper.explain(why))?;
     epochs.finish();
     let mut meta = trained.policy.meta();
@@ -107,7 +117,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome> {
 }
 
 /// Says where training starts.
-fn announce(console: &Console, resume: bool, checkpoint: Option<&Checkpoint>, path: &Path) {
+pub fn announce(console: &Console, resume: bool, checkpoint: Option<&Checkpoint>, path: &Path) {
     let path_shown = path.display();
     match checkpoint {
         Some(checkpoint) => console.say(&format!("train: continues after {}, from {path_shown}", checkpoint.after())),
@@ -141,14 +151,18 @@ fn read_dynamics(path: &Path, task: Task) -> Result<(Dynamics, ContentHash)> {
     Ok((Dynamics::from_tensors(&tensors, &meta).map_err(|why| Error::input(path, why))?, content))
 }
 
-fn method(name: &str) -> std::result::Result<Method, String> {
+fn method(name: &str) -> std::result::Result<Teacher, String> {
     match name {
-        "hil" => Ok(Method::Hil),
-        "bc" => Ok(Method::Bc),
-        "sc" => Ok(Method::Sc),
+        "hil" => Ok(Teacher::Demos(Method::Hil)),
+        "bc" => Ok(Teacher::Demos(Method::Bc)),
+        "sc" => Ok(Teacher::Demos(Method::Sc)),
+        "ppo" => Ok(Teacher::Rewards),
         _ => {
-            let hint = did_you_mean(name, ["hil", "bc", "sc"]);
-            Err(format!("unknown method \"{name}\"{hint}; allowed: hil (both losses), bc (behavior cloning), sc (state cloning)"))
+            let hint = did_you_mean(name, ["hil", "bc", "sc", "ppo"]);
+            Err(format!(
+                "unknown method \"{name}\"{hint}; allowed: hil (both losses), bc (behavior cloning), sc (state cloning), \
+                 ppo (reinforcement learning)"
+            ))
         }
     }
 }

@@ -1,12 +1,14 @@
-//! What a task is: scene, spawn area, named success conditions, milestones of the reward, failure classes. One file a task.
+//! What a task is: scene, spawn area, named success conditions, milestones of the reward and a dense one, failure classes. One file a task.
 
 mod monitor;
 pub mod pick_and_place;
 pub mod pick_up;
+mod reward;
 mod spawn;
 pub mod stack;
 
 pub use monitor::{Monitor, Observation, Verdict};
+pub use reward::dense;
 pub use spawn::{REACH_M, REST_HEIGHT_M, draw_scene};
 
 use crate::state::BASE_DIM;
