@@ -4,7 +4,7 @@ use super::checkpoint::{self, Keeper};
 use super::common::path_or;
 use super::places::{Content, beside};
 use super::train::{Args, KIND, announce};
-use super::{Console, Context, Outcome};
+use super::{Context, Outcome};
 use crate::config::{Pipeline, Stage};
 use crate::data::{atomic, table_file, weights};
 use crate::env::Env;

@@ -111,3 +111,86 @@ impl Running {
         seen.ok().filter(sound)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::plan::Planner;
+    use crate::scene::Obstacle;
+    use crate::sim::{Controller, Follower};
+
+    fn env(change: impl Fn(&mut Pipeline)) -> TaskEnv {
+        let mut pipeline = Pipeline::defaults(Task::PickUp);
+        change(&mut pipeline);
+        TaskEnv::new(&pipeline, 11)
+    }
+
+    fn begin(env: &mut TaskEnv, episode: u64) -> Vec<f32> {
+        let mut seen = vec![0.0; env.observation_len()];
+        env.reset(episode, &mut seen).expect("an episode");
+        seen
+    }
+
+    #[test]
+    fn an_episode_comes_back_by_its_actions_and_is_cut_at_the_horizon() {
+        let mut env = env(|pipeline| pipeline.train.ppo.horizon_steps = 15);
+        let mut run = |episode: u64| {
+            let (mut seen, mut all) = (begin(&mut env, episode), Vec::new());
+            loop {
+                let action: Vec<f32> = (0..JOINTS).map(|i| 0.3 * ((all.len() + i) as f32).sin()).collect();
+                let outcome = env.step(&action, &mut seen);
+                all.push((seen.clone(), outcome));
+                if outcome.end.is_some() {
+                    return all;
+                }
+            }
+        };
+        let first = run(3);
+        assert_eq!((first.len(), first[14].1.end), (15, Some(End::Truncated)));
+        assert_ne!(run(4), first);
+        assert_eq!(run(3), first);
+    }
+
+    /// Sum of the rewards of the demonstrator's episode, and the last of them.
+    fn demonstrated(reward: RewardKind) -> (f64, f64) {
+        let mut env = env(|pipeline| pipeline.train.ppo.reward = reward);
+        let mut seen = begin(&mut env, 0);
+        let scene = env.running.as_ref().expect("begun").scene.clone();
+        let plan = Planner::new(&Pipeline::defaults(Task::PickUp).plan).plan(0, &scene, &mut stream(0, "env test", 0));
+        let mut follower = Follower::new(&plan.expect("a plan")).expect("a follower");
+        let mut sum = 0.0;
+        loop {
+            let now = env.running.as_mut().expect("begun").world.observe();
+            let outcome = env.step(&follower.command(&now).map(|v| v as f32), &mut seen);
+            sum += f64::from(outcome.reward);
+            if let Some(end) = outcome.end {
+                assert!(outcome.success && end == End::Terminated, "the demonstrator fails");
+                return (sum, f64::from(outcome.reward));
+            }
+            assert!((0.0..=1.0).contains(&outcome.reward), "{outcome:?}");
+        }
+    }
+
+    #[test]
+    fn the_demonstrator_earns_every_milestone_and_the_densest_reward_at_the_end() {
+        let (milestones, _) = demonstrated(RewardKind::Staged);
+        assert!((milestones - 1.11).abs() < 1e-6, "{milestones}");
+        let (_, last) = demonstrated(RewardKind::Dense);
+        let gamma = Pipeline::defaults(Task::PickUp).train.ppo.gamma;
+        assert!((last - 1.0 - 1.0 / (1.0 - gamma)).abs() < 1e-4, "{last}");
+    }
+
+    #[test]
+    fn a_simulation_that_breaks_down_ends_the_episode() {
+        let mut wall = env(|pipeline| {
+            pipeline.scene.obstacles = vec![Obstacle { center_m: [0.0, 0.0, 0.3], size_m: [0.02; 3] }];
+        });
+        let mut seen = begin(&mut wall, 0);
+        let ends = (0..20).find_map(|_| {
+            let outcome = wall.step(&[0.0; JOINTS], &mut seen);
+            outcome.end.map(|end| (end, outcome.reward, outcome.success))
+        });
+        assert_eq!(ends, Some((End::Terminated, 0.0, false)));
+        assert!(seen.iter().all(|v| v.is_finite()));
+    }
+}

@@ -4,12 +4,13 @@
 //!
 //! | task | before the grasp | gripped | where the task wants it |
 //! |---|---|---|---|
-//! | all | 2 near(tool to block) | | |
+//! | all | 2 near(tool to block) + 1.5 around(tool to block) closed | | |
 //! | pick-up | | 4 + 3 near(height still to rise) | 8: at height, gripped |
 //! | pick-and-place, stack | | 4 + near(block to target) | 6 + (opened + still) / 2 |
 //!
-//! over 8, so that a step earns at most 1; near(d) = 1 - tanh(5 d / m). An episode ends with success, which must not cost what standing
-//! there for ever would earn: the step that solves the task earns 1 / (1 - gamma) besides.
+//! over 8, so that a step earns at most 1; near(d) = 1 - tanh(d / 20 cm), around(d) = 1 - tanh(d / 3 cm). The fingers are driven by their
+//! velocities, and noise alone hardly ever closes two of them: the way there is paid too. An episode ends with success, which must not
+//! cost what standing there for ever would earn: the step that solves the task earns 1 / (1 - gamma) besides.
 
 use super::monitor::Observation;
 use super::{Task, Verdict, pick_up};
@@ -21,6 +22,8 @@ use crate::state::ARM_JOINTS;
 const MOST: f64 = 8.0;
 /// Distances are told apart within this \[m\]: near(d) is 1/2 at 11 cm.
 const NEAR_M: f64 = 0.2;
+/// The fingers are around the block when the tool point is within this of its centre \[m\]; above the block it is not.
+const AROUND_M: f64 = 0.03;
 /// Speeds are told apart within this \[m/s\].
 const STILL_M_S: f64 = 0.1;
 /// Angle of a finger that is closed around nothing \[rad\]: its upper limit.
@@ -40,27 +43,31 @@ fn stage(scene: &Scene, seen: &Observation, verdict: &Verdict) -> f64 {
     match scene.task {
         Task::PickUp if gripped => {
             let still_to_rise = (pick_up::TARGET_HEIGHT_M - seen.state.block.position_m[2]).max(0.0);
-            if still_to_rise > 0.0 { 4.0 + 3.0 * near(still_to_rise) } else { MOST }
+            if still_to_rise > 0.0 { 4.0 + 3.0 * near(still_to_rise, NEAR_M) } else { MOST }
         }
         Task::PickAndPlace | Task::Stack if at_goal => 6.0 + (opened(seen) + still(seen)) / 2.0,
-        Task::PickAndPlace | Task::Stack if gripped => 4.0 + near(seen.block_to(scene.target_m())),
-        _ => 2.0 * near(seen.block_to(seen.tool_m)),
+        Task::PickAndPlace | Task::Stack if gripped => 4.0 + near(seen.block_to(scene.target_m()), NEAR_M),
+        _ => {
+            let away = seen.block_to(seen.tool_m);
+            2.0 * near(away, NEAR_M) + 1.5 * near(away, AROUND_M) * closed(seen)
+        }
     }
 }
 
-/// 1 at no distance, 0 far away.
-fn near(distance_m: f64) -> f64 {
-    1.0 - tanh(distance_m / NEAR_M)
+/// 1 at no distance, 0 beyond a few times `scale_m`.
+fn near(distance_m: f64, scale_m: f64) -> f64 {
+    1.0 - tanh(distance_m / scale_m)
+}
+
+/// How far the fingers are closed, 0 to 1.
+fn closed(seen: &Observation) -> f64 {
+    let fingers = &seen.state.q_rad[ARM_JOINTS..];
+    (fingers.iter().sum::<f64>() / (fingers.len() as f64 * CLOSED_RAD)).clamp(0.0, 1.0)
 }
 
 /// How far the fingers are open; 1 once they have let go.
 fn opened(seen: &Observation) -> f64 {
-    if seen.released() {
-        return 1.0;
-    }
-    let fingers = &seen.state.q_rad[ARM_JOINTS..];
-    let closed = fingers.iter().sum::<f64>() / (fingers.len() as f64 * CLOSED_RAD);
-    1.0 - closed.clamp(0.0, 1.0)
+    if seen.released() { 1.0 } else { 1.0 - closed(seen) }
 }
 
 /// 1 for a block at rest.

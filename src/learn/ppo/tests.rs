@@ -170,7 +170,7 @@ fn a_checkpoint_that_does_not_fit_is_refused() {
         change(&mut tensors, &mut meta);
         toy(&settings).restore(&tensors, &meta).expect_err("refused").to_string()
     };
-    assert!(said(&|tensors, _| tensors.truncate(2)).contains("value.net is missing"));
+    assert!(said(&|tensors, _| tensors.truncate(2)).contains("policy.net.first_moment is missing"));
     assert!(said(&|_, meta| meta["worlds"] = serde_json::json!([])).contains("0 worlds, this run 16"));
     assert!(said(&|_, meta| meta["worlds"][3]["steps"] = 1000.into()).contains("step 1000"));
     assert!(said(&|_, meta| meta["statistics"]["squares"][0] = (-1.0).into()).contains("statistics"));
