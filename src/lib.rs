@@ -16,6 +16,7 @@
 //! | Algorithm 2: BC; Eq. 3: L_BC; Eq. 4: p_t, d_conv | [`learn::behavior_cloning`] | loss on the demos' states, degree of policy convergence |
 //! | Algorithm 3: SC; Eq. 5: L_SC; rho | [`learn::state_cloning`] | rollouts in f_phi, stochastic recovery, gradient through time |
 //! | Algorithm 4; Eq. 6: L_model | [`mod@learn::pretrain_dynamics`] | pretraining of f_phi; [`learn::Learner::fine_tune`] goes on with it |
+//! | (not in the paper) | [`mod@learn::ppo`] | proximal policy optimisation in the simulator, from rewards alone |
 //! | N(0, .001) on actions | [`sim`] | noise while demos are recorded and policies evaluated |
 //! | tasks, milestones, success | [`tasks`] | pick-up, pick-and-place, stack: one file each |
 //! | success rates | [`eval`] | seeded rollouts, Wilson intervals, failures by class |

@@ -6,7 +6,7 @@
 //! |---|---|---|---|
 //! | all | 2 near(tool to block) + 1.5 around(tool to block) closed | | |
 //! | pick-up | | 4 + 3 near(height still to rise) | 8: at height, gripped |
-//! | pick-and-place, stack | | 4 + near(block to target) | 6 + (opened + still) / 2 |
+//! | pick-and-place, stack | | 4 + near(block to target) | 6 + opened + still |
 //!
 //! over 8, so that a step earns at most 1; near(d) = 1 - tanh(d / 20 cm), around(d) = 1 - tanh(d / 3 cm). The fingers are driven by their
 //! velocities, and noise alone hardly ever closes two of them: the way there is paid too. An episode ends with success, which must not
@@ -45,7 +45,7 @@ fn stage(scene: &Scene, seen: &Observation, verdict: &Verdict) -> f64 {
             let still_to_rise = (pick_up::TARGET_HEIGHT_M - seen.state.block.position_m[2]).max(0.0);
             if still_to_rise > 0.0 { 4.0 + 3.0 * near(still_to_rise, NEAR_M) } else { MOST }
         }
-        Task::PickAndPlace | Task::Stack if at_goal => 6.0 + (opened(seen) + still(seen)) / 2.0,
+        Task::PickAndPlace | Task::Stack if at_goal => 6.0 + opened(seen) + still(seen),
         Task::PickAndPlace | Task::Stack if gripped => 4.0 + near(seen.block_to(scene.target_m()), NEAR_M),
         _ => {
             let away = seen.block_to(seen.tool_m);

@@ -1,8 +1,8 @@
 //! Eight worlds share a panel, and act for an iteration without asking anyone else.
 
 use super::advantage::{Credit, advantages};
+use super::episodes::{Episodes, Finished};
 use super::statistics::{Sums, look};
-use super::worlds::{Finished, World};
 use crate::env::End;
 use crate::error::Result;
 use crate::learn::policy::Policy;
@@ -54,7 +54,7 @@ pub struct Record {
 #[derive(Default)]
 pub struct Group {
     /// The worlds, one a lane.
-    pub worlds: Vec<World>,
+    pub worlds: Vec<Episodes>,
     rewards: Vec<Lanes>,
     ends: Vec<[Option<End>; LANES]>,
     /// Step and lane of the ends of episodes that were cut off, and their last observations.
@@ -67,7 +67,7 @@ pub struct Group {
 
 impl Group {
     /// Of eight worlds.
-    pub fn new(worlds: Vec<World>) -> Self {
+    pub fn new(worlds: Vec<Episodes>) -> Self {
         Group { worlds, ..Group::default() }
     }
 

@@ -11,6 +11,7 @@
 //! and sums are taken in one order. A world comes back by its actions since the last reset ([`Ppo::restore`]).
 
 mod advantage;
+mod episodes;
 mod group;
 mod metrics;
 mod objective;
@@ -18,7 +19,8 @@ mod state;
 mod statistics;
 #[cfg(test)]
 mod tests;
-mod worlds;
+#[cfg(test)]
+mod toy;
 
 pub use metrics::{METRICS, Row};
 
@@ -35,13 +37,13 @@ use crate::seed::stream;
 use crate::state::JOINTS;
 use crate::tasks::Task;
 use advantage::{Credit, normalise};
+use episodes::Episodes;
 use group::{Actors, Group, Record};
 use metrics::Tally;
 use objective::{Choices, Seen, Work};
 use rand::seq::SliceRandom;
 use rayon::prelude::*;
 use statistics::{Sight, Statistics};
-use worlds::World;
 
 /// The last layer of the policy starts this small: the first actions are noise around standing still.
 const FIRST_ACTIONS: f32 = 0.01;
@@ -234,7 +236,7 @@ fn worlds_in_groups(task: Task, settings: &PpoSettings, make: impl Fn(usize) -> 
                 task.state_dim()
             )));
         }
-        World::new(env, place as u64, count)
+        Episodes::new(env, place as u64, count)
     };
     let groups = (0..settings.worlds).step_by(LANES);
     groups.map(|first| Ok(Group::new((first..first + LANES).map(world).collect::<Result<_>>()?))).collect()

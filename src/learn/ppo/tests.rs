@@ -2,59 +2,11 @@
 
 use super::group::Record;
 use super::objective::{Choices, Work};
+use super::toy::{GAMMA, Regulator, TASK, best_gain, cost};
 use super::*;
 use crate::config::{FeatureSet, PpoSettings, TrainSettings};
-use crate::env::{End, Outcome};
 use crate::math::exp;
 use crate::nn::Lanes;
-use rand::RngExt;
-
-/// Two joints are to come to 0: x' = x + GAIN u, a step costs x^2 + EFFORT u^2 each, and an episode is cut off.
-struct Regulator {
-    seed: u64,
-    x: [f32; 2],
-    left: u32,
-}
-
-const GAIN: f64 = 0.5;
-const EFFORT: f64 = 0.2;
-const STEPS: u32 = 20;
-const GAMMA: f64 = 0.9;
-const TASK: Task = Task::PickUp;
-
-impl Regulator {
-    fn show(&self, observation: &mut [f32]) {
-        observation.fill(0.0);
-        observation[..2].copy_from_slice(&self.x);
-    }
-}
-
-impl Env for Regulator {
-    fn observation_len(&self) -> usize {
-        TASK.state_dim()
-    }
-
-    fn action_len(&self) -> usize {
-        JOINTS
-    }
-
-    fn reset(&mut self, episode: u64, observation: &mut [f32]) -> Result<()> {
-        let mut rng = stream(self.seed, "toy.start", episode);
-        self.x = std::array::from_fn(|_| 2.0 * rng.random::<f32>() - 1.0);
-        self.left = STEPS;
-        self.show(observation);
-        Ok(())
-    }
-
-    fn step(&mut self, action: &[f32], observation: &mut [f32]) -> Outcome {
-        let costs = self.x.iter().zip(action).map(|(x, u)| x * x + EFFORT as f32 * u * u);
-        let reward = 1.0 - costs.sum::<f32>();
-        self.x.iter_mut().zip(action).for_each(|(x, u)| *x += GAIN as f32 * u);
-        self.left -= 1;
-        self.show(observation);
-        Outcome { reward, end: (self.left == 0).then_some(End::Truncated), success: false }
-    }
-}
 
 fn settings() -> TrainSettings {
     let ppo = PpoSettings {
@@ -72,35 +24,7 @@ fn settings() -> TrainSettings {
 }
 
 fn toy(settings: &TrainSettings) -> Ppo {
-    Ppo::new(TASK, settings, 11, |_| Ok(Box::new(Regulator { seed: 11, x: [0.0; 2], left: 0 }))).expect("worlds")
-}
-
-/// Mean discounted cost of a controller from some starts, over so many steps that the rest counts for nothing.
-fn cost(mut control: impl FnMut(&[f32]) -> [f32; 2]) -> f64 {
-    let mut world = Regulator { seed: 12, x: [0.0; 2], left: 0 };
-    let mut seen = vec![0.0; TASK.state_dim()];
-    let mut total = 0.0;
-    for episode in 0..20 {
-        world.reset(episode, &mut seen).expect("a start");
-        world.left = u32::MAX;
-        let mut weight = 1.0;
-        for _ in 0..100 {
-            let mut action = [0.0; JOINTS];
-            action[..2].copy_from_slice(&control(&seen));
-            total += weight * (1.0 - f64::from(world.step(&action, &mut seen).reward));
-            weight *= GAMMA;
-        }
-    }
-    total / 20.0
-}
-
-/// The gain of the best controller, u = -k x: the discounted Riccati equation in one dimension.
-fn best_gain() -> f64 {
-    let mut p = 1.0f64;
-    for _ in 0..1000 {
-        p = 1.0 + GAMMA * p - (GAMMA * p * GAIN).powi(2) / (EFFORT + GAMMA * p * GAIN * GAIN);
-    }
-    GAMMA * p * GAIN / (EFFORT + GAMMA * p * GAIN * GAIN)
+    Ppo::new(TASK, settings, 11, |_| Ok(Box::new(Regulator::new(11)))).expect("worlds")
 }
 
 #[test]
@@ -178,7 +102,7 @@ fn a_checkpoint_that_does_not_fit_is_refused() {
 
 #[test]
 fn worlds_of_another_task_and_settings_out_of_range_are_refused() {
-    let make = |_| -> Result<Box<dyn Env>> { Ok(Box::new(Regulator { seed: 0, x: [0.0; 2], left: 0 })) };
+    let make = |_| -> Result<Box<dyn Env>> { Ok(Box::new(Regulator::new(0))) };
     let refused = |task, settings: &TrainSettings| Ppo::new(task, settings, 0, make).err().expect("refused").to_string();
     assert!(refused(Task::Stack, &settings()).contains("shows 25 numbers"));
     let mut odd = settings();

@@ -1,16 +1,17 @@
-//! A world in the middle of an episode.
+//! The episodes of one world, one after another.
 
 use crate::env::{End, Env};
 use crate::error::Result;
 use crate::state::JOINTS;
 
-/// One world in the middle of an episode.
-pub struct World {
+/// A world in the middle of an episode.
+pub struct Episodes {
     env: Box<dyn Env>,
-    /// Its place among all worlds, and how many there are: the numbers of its episodes.
+    /// Its place among all worlds: its episodes are number `place`, `place + worlds`, and so on.
     pub place: u64,
+    /// How many worlds there are.
     pub worlds: u64,
-    /// Episodes that it has begun.
+    /// How many have begun.
     pub begun: u64,
     /// Actions of the present episode, one after another: they lead back to where it is.
     pub actions: Vec<f32>,
@@ -30,16 +31,22 @@ pub struct Finished {
     pub success: bool,
 }
 
-impl World {
-    /// World `place` of `worlds`, at the beginning of its first episode.
+impl Episodes {
+    /// Those of world `place` of `worlds`, at the beginning of the first.
+    ///
+    /// # Errors
+    /// What the first episode returns.
     pub fn new(env: Box<dyn Env>, place: u64, worlds: u64) -> Result<Self> {
         let observation = vec![0.0; env.observation_len()];
-        let mut world = World { env, place, worlds, begun: 0, actions: Vec::new(), observation, earned: 0.0 };
+        let mut world = Episodes { env, place, worlds, begun: 0, actions: Vec::new(), observation, earned: 0.0 };
         world.begin()?;
         Ok(world)
     }
 
-    /// Begins its next episode.
+    /// Begins the next.
+    ///
+    /// # Errors
+    /// What the world returns.
     pub fn begin(&mut self) -> Result<()> {
         let episode = self.place + self.worlds * self.begun;
         (self.begun, self.earned) = (self.begun + 1, 0.0);
@@ -47,7 +54,10 @@ impl World {
         self.env.reset(episode, &mut self.observation)
     }
 
-    /// Comes back to where the world was that had begun so many episodes and done these actions in the last.
+    /// Comes back to where the world was when it had begun so many episodes and done these actions in the last.
+    ///
+    /// # Errors
+    /// What the world returns when the episode begins.
     pub fn replay(&mut self, begun: u64, actions: &[f32]) -> Result<()> {
         self.begun = begun.saturating_sub(1);
         self.begin()?;
