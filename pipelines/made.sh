@@ -53,7 +53,7 @@ stage_before() {
         simulate) echo plan ;;
         convert) echo simulate ;;
         pretrain) echo convert ;;
-        train) echo pretrain ;;
+        train) [ "$method" = ppo ] || echo pretrain ;;
         evaluate) echo train ;;
     esac
 }

@@ -18,6 +18,7 @@
 //! | Algorithm 3: SC; Eq. 5: L_SC; rho | [`mod@learn::losses::state_cloning`] | rollouts in f_phi, stochastic recovery, gradient through time |
 //! | Algorithm 4 | [`mod@learn::methods::pretrain_dynamics`] | pretraining of f_phi; [`learn::methods::fine_tuning`] goes on with it |
 //! | Eq. 6: L_model | [`learn::losses::model_loss`] | loss of f_phi on observed transitions |
+//! | PPO, which the paper compares with | [`learn::methods::ppo`] | learns in the simulator from rewards alone |
 //! | N(0, .001) on actions | [`sim`] | noise while demos are recorded and policies evaluated |
 //! | tasks, milestones, success | [`tasks`] | pick-up, pick-and-place, stack: one file each |
 //! | success rates | [`eval`] | seeded rollouts, Wilson intervals, failures by class |
@@ -29,7 +30,7 @@
 //!
 //! - leaves that all may use: [`error`], [`guard`], [`interrupt`], [`math`], [`seed`], [`table`], [`tensor`], [`words`]
 //! - [`nn`]: networks and their engine, knows no robots
-//! - contracts: [`task`], [`state`], [`scene`], [`demo`]; [`robot`]; [`config`], [`pulse`]
+//! - contracts: [`task`], [`state`], [`scene`], [`demo`], [`mod@env`]; [`robot`]; [`config`], [`pulse`]
 //! - [`tasks`], then [`plan`] (scene to demonstration) and [`sim`] (contact physics, the only home of rapier)
 //! - [`data`]: files, the only home of MCAP, Arrow, Parquet and safetensors; knows no learning
 //! - [`learn`]: networks of policy and dynamics, losses, methods, and the loop around them; knows neither files nor simulator
@@ -42,6 +43,7 @@ pub mod cmd;
 pub mod config;
 pub mod data;
 pub mod demo;
+pub mod env;
 pub mod error;
 pub mod eval;
 pub mod experiment;

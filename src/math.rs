@@ -42,6 +42,11 @@ pub fn acos(x: f64) -> f64 {
     libm::acos(x)
 }
 
+/// The hyperbolic tangent.
+pub fn tanh(x: f64) -> f64 {
+    libm::tanh(x)
+}
+
 /// The square root of x^2 + y^2.
 pub fn hypot(x: f64, y: f64) -> f64 {
     libm::hypot(x, y)

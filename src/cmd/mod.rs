@@ -14,6 +14,7 @@ mod inspect;
 mod output;
 mod places;
 mod plan;
+mod ppo;
 mod pretrain;
 mod render;
 mod settings;

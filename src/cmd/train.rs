@@ -8,9 +8,9 @@ use crate::data::{ContentHash, atomic, table_file, weights};
 use crate::error::{Error, Result};
 use crate::eval::{PolicyController, Rollouts};
 use crate::interrupt::Interrupt;
-use crate::learn::{Checkpoint, Dynamics, Hooks, Inputs, MethodName, Policy, Selection, train};
+use crate::learn::{self, Checkpoint, Dynamics, Hooks, Inputs, MethodName, Policy, Ppo, Selection, imitator};
 use crate::scene::Scene;
-use crate::sim::Controller;
+use crate::sim::{Controller, TaskEnv};
 use crate::task::Task;
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
@@ -20,12 +20,13 @@ use std::time::Duration;
 /// Kind of the weights that this stage writes.
 pub const KIND: &str = weights::POLICY;
 
-/// Learn the policy: hybrid imitation learning (Algorithm 1), behavior cloning (2) or state cloning (3).
+/// Learn the policy: hybrid imitation learning (Algorithm 1), behavior cloning (2) or state cloning (3) from demos, or reinforcement
+/// learning in the simulator (ppo).
 #[derive(Debug, clap::Args)]
 pub struct Args {
     #[command(flatten)]
     settings: SettingsArgs,
-    /// Method: hil, bc or sc
+    /// Method: hil, bc, sc or ppo
     #[arg(long, value_name = "METHOD", default_value = "hil")]
     method: MethodName,
     /// State recovery probability, 0 to 1 [default: train.rho]
@@ -34,10 +35,10 @@ pub struct Args {
     /// Weight of state cloning: adaptive, or 0 to 1 [default: train.alpha]
     #[arg(long, value_name = "ALPHA", allow_negative_numbers = true)]
     alpha: Option<String>,
-    /// Directory with the datasets train and validation [default: runs/<TASK>/dataset]
+    /// Directory with the datasets train and validation; ppo needs none [default: runs/<TASK>/dataset]
     #[arg(long, value_name = "DIR")]
     dataset: Option<PathBuf>,
-    /// Weights of the dynamics network; bc needs none [default: runs/<TASK>/dynamics.safetensors]
+    /// Weights of the dynamics network; bc and ppo need none [default: runs/<TASK>/dynamics.safetensors]
     #[arg(long, value_name = "FILE.safetensors")]
     dynamics: Option<PathBuf>,
     /// Weights to write [default: runs/<TASK>/policy.safetensors, of another method than hil policy-<METHOD>.safetensors]
@@ -64,16 +65,19 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome> {
     let name = if args.method == MethodName::Hil { "policy.safetensors".into() } else { format!("policy-{method}.safetensors") };
     let out = path_or(args.out.as_deref(), pipeline.task, &name);
     let metrics = args.metrics.clone().unwrap_or_else(|| beside(&out, "training.parquet"));
-    let needs_model = args.method.needs_dynamics() || args.dynamics.is_some();
+    let needs_demos = args.method.needs_demos();
+    let needs_model = args.method.needs_dynamics() || needs_demos && args.dynamics.is_some();
     let kept = beside(&out, checkpoint::ENDING);
-    let places = args.settings.places().read(&dir).read_all(needs_model.then_some(model.as_path()));
+    let read = needs_demos.then_some(dir.as_path()).into_iter().chain(needs_model.then_some(model.as_path()));
+    let places = args.settings.places().read_all(read);
     let places =
         places.write("--out", &out, Content::Weights(KIND, "train")).write("--metrics", &metrics, Content::Table("train"));
     let checkpoint = if args.resume { Content::Own } else { Content::Weights(weights::CHECKPOINT, "train") };
     places.write("the checkpoint", &kept, checkpoint).check(&context.console)?;
-    let pretrain::Demos { train: demos, validation, content } = pretrain::demos(&dir, &pipeline)?;
+    let (demos, dataset) = needs_demos.then(|| read_demos(&dir, &pipeline)).transpose()?.unzip();
     let (dynamics, model) = needs_model.then(|| read_dynamics(&model, pipeline.task)).transpose()?.unzip();
-    let inputs: Vec<_> = [("dataset", content)].into_iter().chain(model.map(|content| ("dynamics", content))).collect();
+    let inputs = [dataset.map(|content| ("dataset", content)), model.map(|content| ("dynamics", content))];
+    let inputs: Vec<_> = inputs.into_iter().flatten().collect();
     let mut provenance = args.settings.provenance(Stage::Train, &pipeline, &inputs)?;
     provenance.settings["method"] = method.into();
 
@@ -81,6 +85,11 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome> {
     let resume = if args.resume { checkpoint::read(&kept, &provenance)? } else { None };
     announce(console, args.resume, resume.as_ref(), &kept);
     let mut keeper = Keeper::new(&kept, &provenance, console, resume.as_ref());
+    let settings = &pipeline.train;
+    let learner = match demos {
+        Some(inputs) => imitator(args.method, inputs, dynamics, settings, seed)?,
+        None => Box::new(Ppo::new(pipeline.task, settings, seed, |_| Ok(Box::new(TaskEnv::new(&pipeline, seed))))?),
+    };
     let mut epochs = Epochs::new(console);
     let hooks = Hooks {
         log: Box::new(|epoch, metrics| epochs.step(epoch, metrics)),
@@ -90,8 +99,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome> {
         resume,
         interrupt: &context.interrupt,
     };
-    let trained = train(args.method, Inputs::new(demos, validation)?, dynamics, &pipeline.train, seed, hooks);
-    let trained = trained.map_err(|why| keeper.explain(why))?;
+    let trained = learn::run(learner, settings, hooks).map_err(|why| keeper.explain(why))?;
     epochs.finish();
     let mut meta = trained.policy.meta();
     if let Some(selection) = &trained.selection {
@@ -132,6 +140,11 @@ fn successes(pipeline: &Pipeline, seed: u64, policy: &Policy, interrupt: &Interr
 /// The selection as the description of the weights has it.
 fn stated(selection: &Selection, episodes: u64, seed: u64) -> Value {
     json!({ "episodes": episodes, "seed": seed, "candidates": selection.candidates, "chosen": selection.best() })
+}
+
+fn read_demos(dir: &Path, pipeline: &Pipeline) -> Result<(Inputs, ContentHash)> {
+    let pretrain::Demos { train, validation, content } = pretrain::demos(dir, pipeline)?;
+    Ok((Inputs::new(train, validation)?, content))
 }
 
 fn read_dynamics(path: &Path, task: Task) -> Result<(Dynamics, ContentHash)> {

@@ -6,6 +6,7 @@ mod choices;
 mod data;
 mod limits;
 mod load;
+mod ppo;
 mod pretrain;
 mod ranges;
 mod scene;
@@ -16,6 +17,7 @@ pub use choices::{
 };
 pub use data::{ConvertSettings, EvaluateSettings};
 pub use load::{Preset, Source};
+pub use ppo::{PpoSettings, RewardKind};
 pub use pretrain::PretrainSettings;
 pub use ranges::{MOST_LAYERS, MOST_STEPS, MOST_UNITS};
 pub use scene::{PlanSettings, PulseSettings, SceneSettings, SimulateSettings, Spread, check_scene};

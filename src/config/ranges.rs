@@ -51,6 +51,10 @@ const LIGHTEST: (f64, &str) = (0.001, "a lighter block is lost in the simulator'
 pub(super) const MOST_EPOCHS: f64 = 1_000_000.0;
 /// Updates of a stage: hours of the smallest network.
 const MOST_UPDATES: f64 = 10_000_000.0;
+/// Control steps of reinforcement learning: weeks.
+const MOST_TRIALS: f64 = 1e10;
+/// Worlds side by side, half a megabyte each.
+const MOST_WORLDS: f64 = 4096.0;
 /// State-action pairs of an update.
 const MOST_ROWS: f64 = 1_000_000.0;
 /// What single precision holds; a learning rate, a norm or a scale beyond it is no number there.
@@ -123,6 +127,23 @@ pub(super) const RANGES: &[Range] = &[
     below("train.ema_decay", 0.0, 1.0),
     within("train.select_episodes", 0.0, MOST_EPISODES),
     within("train.select_candidates", 1.0, MOST_EPOCHS),
+    within("train.ppo.total_steps", 1.0, MOST_TRIALS),
+    within("train.ppo.worlds", 1.0, MOST_WORLDS),
+    within("train.ppo.steps", 1.0, STEPS),
+    within("train.ppo.horizon_steps", 1.0, STEPS),
+    below("train.ppo.gamma", 0.0, 1.0),
+    within("train.ppo.gae_lambda", 0.0, 1.0),
+    above("train.ppo.clip", 0.0, 10.0),
+    within("train.ppo.epochs", 1.0, 1000.0),
+    within("train.ppo.minibatch", 1.0, MOST_ROWS),
+    above("train.ppo.learning_rate", 0.0, SINGLE),
+    above("train.ppo.final_learning_rate", 0.0, SINGLE),
+    above("train.ppo.value_learning_rate", 0.0, SINGLE),
+    within("train.ppo.entropy", 0.0, SCALE[1]),
+    within("train.ppo.target_kl", 0.0, SCALE[1]),
+    within("train.ppo.clip_norm", 0.0, SINGLE),
+    above("train.ppo.action_unit", 0.0, 10.0),
+    within("train.ppo.initial_std", SCALE[0], SCALE[1]),
 ];
 
 impl Range {

@@ -2,6 +2,7 @@
 
 use super::choices::{ActionChoice, Alpha, Convergence, FeatureSet, FingerCloning, Objective, Pairs, StateScale};
 use super::limits::{network, within_ranges};
+use super::ppo::PpoSettings;
 use super::scene::PulseSettings;
 use crate::error::{Error, Result};
 use crate::nn::Activation;
@@ -87,6 +88,8 @@ pub struct TrainSettings {
     pub select_episodes: u64,
     /// Candidates of the warm start and of Algorithm 1, each: evenly spaced, the last at the end.
     pub select_candidates: u64,
+    /// Reinforcement learning (`hilt train --method ppo`).
+    pub ppo: PpoSettings,
 }
 
 impl Default for TrainSettings {
@@ -129,6 +132,7 @@ impl Default for TrainSettings {
             ema_decay: 0.999,
             select_episodes: 0,
             select_candidates: 3,
+            ppo: PpoSettings::default(),
         }
     }
 }
@@ -146,6 +150,7 @@ impl TrainSettings {
     pub fn validate(&self) -> Result<()> {
         within_ranges("train", self)?;
         network("train", self.hidden_layers, self.hidden_units)?;
+        self.ppo.validate()?;
         if self.epochs == 0 && self.warm_start_updates == 0 {
             return Err(Error::Usage("train.epochs and train.warm_start_updates are both 0: there is nothing to do".into()));
         }

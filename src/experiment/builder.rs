@@ -58,7 +58,8 @@ impl<'a> Builder<'a> {
             at.dir(varied, None)
         };
         let dataset = match &self.experiment.dataset {
-            Some(given) => self.given(given, at),
+            _ if !method.needs_demos() => None,
+            Some(given) => Some(self.given(given, at)),
             None => {
                 let (plan, simulate, convert) = (shared(Stage::Plan), shared(Stage::Simulate), shared(Stage::Convert));
                 let plans = self.step(at, Stage::Plan, None, &plan, vec![], settings)?;
@@ -66,13 +67,12 @@ impl<'a> Builder<'a> {
                 let recordings = self.step(at, Stage::Simulate, None, &simulate, vec![plans], settings)?;
                 let recordings = self.input("recordings", recordings);
                 let dataset = self.step(at, Stage::Convert, None, &convert, vec![recordings], settings)?;
-                self.input("dataset", dataset)
+                Some(self.input("dataset", dataset))
             }
         };
-        let mut learns_from = vec![dataset.clone()];
-        // Behavior cloning needs no dynamics network.
-        if method != MethodName::Bc {
-            let dynamics = self.step(at, Stage::Pretrain, None, &shared(Stage::Pretrain), vec![dataset], settings)?;
+        let mut learns_from = Vec::from_iter(dataset);
+        if method.needs_dynamics() {
+            let dynamics = self.step(at, Stage::Pretrain, None, &shared(Stage::Pretrain), learns_from.clone(), settings)?;
             learns_from.push(self.input("dynamics", dynamics));
         }
         let own = at.dir(true, Some(method));

@@ -15,10 +15,36 @@ use std::path::Path;
 /// Where presets that do not come with hilt are, a directory each.
 const PIPELINES: &str = "pipelines";
 /// Keys without effect on behavior cloning: what state cloning, the mixture and the dynamics network are set by. A dot or underscore ends a family.
-const NOT_OF_BC: [&str; 6] =
-    ["pretrain.", "train.alpha", "train.rho", "train.sc_", "train.fine_tune_dynamics", "train.dynamics_"];
+const NOT_OF_BC: [&str; 7] =
+    ["pretrain.", "train.alpha", "train.rho", "train.sc_", "train.fine_tune_dynamics", "train.dynamics_", "train.ppo."];
 /// Keys without effect on state cloning alone.
-const NOT_OF_SC: [&str; 3] = ["train.alpha", "train.warm_start_", "train.bc_batch"];
+const NOT_OF_SC: [&str; 4] = ["train.alpha", "train.warm_start_", "train.bc_batch", "train.ppo."];
+/// Keys without effect on their hybrid.
+const NOT_OF_HIL: [&str; 1] = ["train.ppo."];
+/// Keys without effect on reinforcement learning, which has its own table beside the network's keys of `[train]`.
+const NOT_OF_PPO: [&str; 21] = [
+    "plan.",
+    "convert.",
+    "pretrain.",
+    "train.loss",
+    "train.action",
+    "train.initial_std",
+    "train.d_conv",
+    "train.tau",
+    "train.alpha",
+    "train.rho",
+    "train.sc_",
+    "train.fine_tune_dynamics",
+    "train.dynamics_",
+    "train.warm_start_",
+    "train.bc_batch",
+    "train.epochs",
+    "train.min_updates",
+    "train.batch",
+    "train.learning_rate",
+    "train.clip_norm",
+    "train.ema_decay",
+];
 
 /// What one stage does in a cell of the grid.
 #[derive(Clone, Debug)]
@@ -111,9 +137,10 @@ fn check_variation(variation: &Variation) -> std::result::Result<(), String> {
         }
     }
     let without_effect = |method: MethodName| match method {
-        MethodName::Hil => false,
+        MethodName::Hil => all_of(&variation.set, &NOT_OF_HIL),
         MethodName::Bc => all_of(&variation.set, &NOT_OF_BC),
         MethodName::Sc => all_of(&variation.set, &NOT_OF_SC),
+        MethodName::Ppo => all_of(&variation.set, &NOT_OF_PPO),
     };
     match variation.methods.iter().find(|method| without_effect(**method)) {
         Some(method) => {

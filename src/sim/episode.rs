@@ -137,13 +137,13 @@ fn record(seen: &Observation, verdict: &Verdict, commanded: Action, executed: Ac
 }
 
 /// Whether a block's centre is below the table's top.
-fn fallen(seen: &Observation) -> bool {
+pub(super) fn fallen(seen: &Observation) -> bool {
     let base_height = seen.base_now.map_or(f64::INFINITY, |b| b.position_m[2]);
     seen.state.block.position_m[2].min(base_height) < 0.0
 }
 
 /// Whether every number is one, and none is beyond what can be.
-fn sound(seen: &Observation) -> bool {
+pub(super) fn sound(seen: &Observation) -> bool {
     let state = &seen.state;
     let base = seen.base_now.map_or([0.0; 7], |b| b.to_array());
     let motion = state.q_rad.iter().chain(&state.dq_rad_s).copied();

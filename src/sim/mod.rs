@@ -5,6 +5,7 @@ mod arm;
 mod contacts;
 mod convert;
 mod disturbance;
+mod env;
 mod episode;
 mod follower;
 #[cfg(test)]
@@ -14,6 +15,7 @@ mod replay;
 mod world;
 
 pub use disturbance::Disturbance;
+pub use env::TaskEnv;
 pub use episode::{Controller, run_episode};
 pub use follower::Follower;
 pub use physics::{Grain, Physics};

@@ -1,15 +1,17 @@
-//! What a task is: scene, spawn area, named success conditions, milestones of the reward, failure classes. One file a task.
+//! What a task is: scene, spawn area, named success conditions, milestones of the reward and a dense one, failure classes. One file a task.
 
 mod monitor;
 mod observation;
 pub mod pick_and_place;
 pub mod pick_up;
+mod reward;
 mod spawn;
 pub mod stack;
 
 pub use crate::task::{FailureClass, Task};
 pub use monitor::{Monitor, Verdict};
 pub use observation::Observation;
+pub use reward::dense;
 pub use spawn::{REACH_M, REST_HEIGHT_M, draw_scene};
 
 use crate::scene::{BLOCK_EDGE_M, Scene};

@@ -12,20 +12,21 @@ const LEAVES: [&str; 8] = ["error", "guard", "interrupt", "math", "seed", "table
 
 /// What else each module may use. The order is the house's: a module uses only those above it. One that is not here is refused, so that a
 /// new one gets its place on purpose.
-const FLOW: [(&str, &[&str]); 18] = [
+const FLOW: [(&str, &[&str]); 19] = [
     ("nn", &[]),
     ("task", &[]),
     ("state", &["task"]),
     ("scene", &["state", "task"]),
     ("demo", &["scene", "state", "task"]),
+    ("env", &[]),
     ("robot", &["state"]),
     ("config", &["nn", "scene", "state", "task"]),
     ("pulse", &["config", "state"]),
     ("tasks", &["config", "demo", "scene", "state", "task"]),
     ("plan", &["config", "demo", "robot", "scene", "state", "task", "tasks"]),
-    ("sim", &["config", "demo", "plan", "pulse", "robot", "scene", "state", "task", "tasks"]),
+    ("sim", &["config", "demo", "env", "plan", "pulse", "robot", "scene", "state", "task", "tasks"]),
     ("data", &["config", "demo", "robot", "scene", "state", "task", "tasks"]),
-    ("learn", &["config", "demo", "nn", "pulse", "robot", "state", "task", "tasks"]),
+    ("learn", &["config", "demo", "env", "nn", "pulse", "robot", "state", "task", "tasks"]),
     ("eval", &["config", "demo", "learn", "scene", "sim", "state", "task", "tasks"]),
     ("report", &["data", "demo", "robot", "scene", "state", "task", "tasks"]),
     ("experiment", &["config", "data", "eval", "learn", "plan", "task", "tasks"]),

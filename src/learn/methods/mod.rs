@@ -10,17 +10,19 @@ mod inputs;
 pub mod mixing;
 mod optimizer;
 mod patience;
+pub mod ppo;
 pub mod pretrain_dynamics;
 mod validation;
 
 pub use hil::{Hil, Update};
 pub use inputs::Inputs;
+pub use ppo::Ppo;
 pub use pretrain_dynamics::pretrain_dynamics;
 
 use crate::config::{Alpha, TrainSettings};
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::learn::models::Dynamics;
-use crate::learn::run::{Hooks, Trained, run};
+use crate::learn::run::{Hooks, Method, Trained, run};
 use crate::words::{did_you_mean, shown};
 use std::str::FromStr;
 
@@ -33,28 +35,36 @@ pub enum MethodName {
     Bc,
     /// Algorithm 3 alone: Algorithm 1 with alpha = 1, and no warm start.
     Sc,
+    /// Proximal policy optimisation: no demos, but the simulator.
+    Ppo,
 }
 
 impl MethodName {
     /// All of them.
-    pub const ALL: [MethodName; 3] = [MethodName::Hil, MethodName::Bc, MethodName::Sc];
+    pub const ALL: [MethodName; 4] = [MethodName::Hil, MethodName::Bc, MethodName::Sc, MethodName::Ppo];
 
     /// As `hilt train --method` takes it.
     pub fn name(self) -> &'static str {
-        ["hil", "bc", "sc"][self as usize]
+        ["hil", "bc", "sc", "ppo"][self as usize]
     }
 
     /// Whether it learns through a dynamics network.
     pub fn needs_dynamics(self) -> bool {
-        self != MethodName::Bc
+        matches!(self, MethodName::Hil | MethodName::Sc)
     }
 
-    /// alpha of Eq. 1.
-    fn alpha(self, settings: &TrainSettings) -> Alpha {
+    /// Whether it learns from demos.
+    pub fn needs_demos(self) -> bool {
+        self != MethodName::Ppo
+    }
+
+    /// alpha of Eq. 1, for what Algorithm 1 covers.
+    fn alpha(self, settings: &TrainSettings) -> Option<Alpha> {
         match self {
-            MethodName::Hil => settings.alpha,
-            MethodName::Bc => Alpha::Fixed(0.0),
-            MethodName::Sc => Alpha::Fixed(1.0),
+            MethodName::Hil => Some(settings.alpha),
+            MethodName::Bc => Some(Alpha::Fixed(0.0)),
+            MethodName::Sc => Some(Alpha::Fixed(1.0)),
+            MethodName::Ppo => None,
         }
     }
 }
@@ -66,17 +76,37 @@ impl FromStr for MethodName {
         MethodName::ALL.into_iter().find(|method| method.name() == s).ok_or_else(|| {
             let hint = did_you_mean(s, MethodName::ALL.map(MethodName::name));
             let s = shown(s);
-            format!("unknown method \"{s}\"{hint}; allowed: hil (both losses), bc (behavior cloning), sc (state cloning)")
+            format!("unknown method \"{s}\"{hint}; allowed: hil (both losses), bc (behavior cloning), sc (state cloning), ppo (from rewards)")
         })
     }
+}
+
+/// A method that learns from demos, before its first epoch.
+///
+/// # Errors
+/// [`Error::Usage`] for a setting out of range, a missing dynamics network, or a method that learns from no demos; [`Error::Failed`] for a
+/// dynamics network of another task.
+pub fn imitator(
+    method: MethodName,
+    inputs: Inputs,
+    dynamics: Option<Dynamics>,
+    settings: &TrainSettings,
+    seed: u64,
+) -> Result<Box<dyn Method>> {
+    settings.validate()?;
+    let Some(alpha) = method.alpha(settings) else {
+        return Err(Error::Usage(format!("{} learns in the simulator, not from demos", method.name())));
+    };
+    let from_scratch = TrainSettings { warm_start_updates: 0, ..settings.clone() };
+    let settings = if method == MethodName::Sc { &from_scratch } else { settings };
+    Ok(Box::new(Hil::new(inputs, dynamics, alpha, settings, seed)?))
 }
 
 /// Trains a policy on demos. A run that goes on from a checkpoint of the same run ends with the same bits.
 ///
 /// # Errors
-/// [`crate::error::Error::Usage`] for a setting out of range or a missing dynamics network; [`crate::error::Error::Failed`] without
-/// demos, for a dynamics network of another task, a checkpoint that does not fit, or when a loss is not a number;
-/// [`crate::error::Error::Interrupted`]; what rollouts return.
+/// As [`imitator`]; [`Error::Failed`] for a checkpoint that does not fit, or when a loss is not a number; [`Error::Interrupted`]; what
+/// rollouts return.
 pub fn train(
     method: MethodName,
     inputs: Inputs,
@@ -85,9 +115,5 @@ pub fn train(
     seed: u64,
     hooks: Hooks,
 ) -> Result<Trained> {
-    settings.validate()?;
-    let from_scratch = TrainSettings { warm_start_updates: 0, ..settings.clone() };
-    let settings = if method == MethodName::Sc { &from_scratch } else { settings };
-    let hil = Hil::new(inputs, dynamics, method.alpha(settings), settings, seed)?;
-    run(Box::new(hil), settings, hooks)
+    run(imitator(method, inputs, dynamics, settings, seed)?, settings, hooks)
 }

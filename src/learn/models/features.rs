@@ -47,6 +47,11 @@ impl Features {
         Features { task, set, mask_dq, kept, state, derived, chain: Chain::default() }
     }
 
+    /// The task.
+    pub fn task(&self) -> Task {
+        self.task
+    }
+
     /// Number of network inputs.
     pub fn width(&self) -> usize {
         self.kept.len() + self.derived.width() + self.near_width()

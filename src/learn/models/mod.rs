@@ -17,6 +17,7 @@ pub use features::Features;
 pub use hand::Hand;
 pub use model_report::{ModelReport, error_table};
 pub use policy::Policy;
+pub use relations::{Relations, derived_width, relations};
 pub use samples::{ModelSamples, PolicySamples, Samples};
 pub use scaling::Scaling;
 pub use weights::{Reader, vector};

@@ -38,20 +38,37 @@ impl Policy {
     /// A policy with random weights; scalings and horizon from the training demos.
     pub(in crate::learn) fn new(corpus: &Corpus, settings: &TrainSettings, rng: &mut impl Rng) -> Self {
         let features = Features::fit(corpus, settings.features, settings.mask_dq);
-        let mut widths = vec![settings.hidden_units; settings.hidden_layers + 2];
-        (widths[0], widths[settings.hidden_layers + 1]) = (features.width(), JOINTS);
+        let action = Scaling::fit(corpus.rows(), JOINTS, ACTION_FLOOR_RAD_S, |r, row| row.copy_from_slice(corpus.commanded(r)));
         let mut lengths: Vec<usize> = (0..corpus.demos()).map(|i| corpus.demo(i).len()).collect();
         lengths.sort_unstable();
         let p95 = lengths[(lengths.len() * 95).div_ceil(100) - 1];
+        Self::with_scalings(features, action, (HORIZON_OVER_P95 * p95) as u32, settings, rng)
+    }
+
+    /// The same, where scalings and horizon are known.
+    pub(super) fn with_scalings(
+        features: Features,
+        action: Scaling,
+        horizon_steps: u32,
+        settings: &TrainSettings,
+        rng: &mut impl Rng,
+    ) -> Self {
+        let mut widths = vec![settings.hidden_units; settings.hidden_layers + 2];
+        (widths[0], widths[settings.hidden_layers + 1]) = (features.width(), JOINTS);
         Policy {
-            task: corpus.task,
-            horizon_steps: (HORIZON_OVER_P95 * p95) as u32,
+            task: features.task(),
+            horizon_steps,
             features,
-            action: Scaling::fit(corpus.rows(), JOINTS, ACTION_FLOOR_RAD_S, |r, row| row.copy_from_slice(corpus.commanded(r))),
+            action,
             net: Mlp::new(&widths, settings.activation, rng),
             log_std: vec![ln(settings.initial_std.max(settings.std_floor)) as f32; JOINTS],
             settings: settings.clone(),
         }
+    }
+
+    /// Lets the network see by other scalings.
+    pub(super) fn set_features(&mut self, features: Features) {
+        self.features = features;
     }
 
     /// The task it was trained on.
