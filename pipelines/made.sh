@@ -165,14 +165,14 @@ clean() {
     [ -d "$run" ] || return 0
     cd "$run" || exit
     local of method
-    for method in '' -bc -sc; do
+    for method in '' -bc -sc -ppo; do
         rm -f "policy$method".{safetensors,checkpoint.safetensors,training.parquet} "evaluation$method".{json,parquet,episodes.parquet}
     done
     rm -f plans.parquet dynamics.{safetensors,parquet,errors.parquet,pretraining.parquet} {pre,}training.parquet episode-00000.png
     rm -rf {plans,recordings}.unfinished/{run-*,.hilt-*}
-    rm -f recordings/episode-*.mcap logs/{plan,simulate,convert,pretrain,train{,-bc,-sc},evaluate{,-bc,-sc}}.log
+    rm -f recordings/episode-*.mcap logs/{plan,simulate,convert,pretrain,train{,-bc,-sc,-ppo},evaluate{,-bc,-sc,-ppo}}.log
     rm -f dataset/{train,validation}/{meta/{info.json,stats.json,tasks.parquet},{data,meta/episodes}/chunk-*/file-*.parquet}
-    rm -f settings/{,.}{plan,simulate,convert,pretrain,train{,-bc,-sc},evaluate{,-bc,-sc}}.{toml,begun}
+    rm -f settings/{,.}{plan,simulate,convert,pretrain,train{,-bc,-sc,-ppo},evaluate{,-bc,-sc,-ppo}}.{toml,begun}
     rm -rf .hilt-* {dataset,recordings,settings}/.hilt-*
     rm -f {.,settings,logs,recordings,{plans,recordings}.unfinished,dataset,dataset/*,dataset/*/{data,meta},dataset/*/{data,meta/episodes}/chunk-*}/{.DS_Store,.directory,Thumbs.db}
     find recordings {plans,recordings}.unfinished dataset settings logs -depth -type d -exec rmdir {} + 2> /dev/null
