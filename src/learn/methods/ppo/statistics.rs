@@ -120,7 +120,7 @@ pub fn look(features: &Features, state: &[Lanes], out: &mut [Lanes], sums: &mut 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::learn::testing::random_states;
+    use crate::learn::tests::testing::random_states;
     use crate::nn::{LANES, kernel};
 
     #[test]
