@@ -14,7 +14,6 @@ mod inspect;
 mod output;
 mod places;
 mod plan;
-mod ppo;
 mod pretrain;
 mod render;
 mod settings;

@@ -12,7 +12,7 @@
 //! velocities, and noise alone hardly ever closes two of them: the way there is paid too. An episode ends with success, which must not
 //! cost what standing there for ever would earn: the step that solves the task earns 1 / (1 - gamma) besides.
 
-use super::monitor::Observation;
+use super::observation::Observation;
 use super::{Task, Verdict, pick_up};
 use crate::math::tanh;
 use crate::scene::Scene;

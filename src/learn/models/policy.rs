@@ -46,7 +46,7 @@ impl Policy {
     }
 
     /// The same, where scalings and horizon are known.
-    pub(super) fn with_scalings(
+    pub(in crate::learn) fn with_scalings(
         features: Features,
         action: Scaling,
         horizon_steps: u32,
@@ -67,7 +67,7 @@ impl Policy {
     }
 
     /// Lets the network see by other scalings.
-    pub(super) fn set_features(&mut self, features: Features) {
+    pub(in crate::learn) fn set_features(&mut self, features: Features) {
         self.features = features;
     }
 

@@ -44,7 +44,13 @@ impl Method for Ppo {
     fn restore(&mut self, counts: &Value, tensors: &Reader, last: &EpochMetrics) -> std::result::Result<(), String> {
         Ppo::restore(self, tensors.tensors, counts).map_err(|why| why.to_string())?;
         if (self.iteration, self.updates) != (last.epoch, last.updates) {
-            return Err(format!("it counts {} iterations and {} updates, its {} {}", self.iteration, self.updates, last.place(), last.updates));
+            return Err(format!(
+                "it counts {} iterations and {} updates, its {} {}",
+                self.iteration,
+                self.updates,
+                last.place(),
+                last.updates
+            ));
         }
         Ok(())
     }

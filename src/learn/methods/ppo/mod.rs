@@ -23,11 +23,11 @@ mod tests;
 #[cfg(test)]
 mod toy;
 
-use crate::learn::limits::affordable;
-use crate::learn::models::{Policy, Scaling};
 use crate::config::{PpoSettings, TrainSettings};
 use crate::env::Env;
 use crate::error::{Error, Result};
+use crate::learn::limits::affordable;
+use crate::learn::models::{Policy, Scaling};
 use crate::math::ln;
 use crate::nn::{Adam, LANES, Mlp, clip_by_global_norm, cosine, gaussian};
 use crate::robot::VELOCITY_LIMITS_RAD_S;

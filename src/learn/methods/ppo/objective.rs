@@ -1,8 +1,8 @@
 //! The clipped objective (Schulman et al. 2017) and the loss of the value network over some panels of steps, with their gradients.
 
 use super::group::Record;
-use crate::learn::models::Policy;
 use crate::learn::losses::shards;
+use crate::learn::models::Policy;
 use crate::math::exp_f32;
 use crate::nn::{LANES, Lanes, Mlp, Pass};
 use crate::state::JOINTS;
