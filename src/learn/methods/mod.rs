@@ -5,7 +5,6 @@ mod cost;
 pub mod descent;
 pub mod fine_tuning;
 pub mod hil;
-mod hil_metrics;
 mod inputs;
 pub mod mixing;
 mod optimizer;

@@ -127,7 +127,7 @@ impl Ppo {
         self.iteration * self.settings.batch()
     }
 
-    /// One iteration; what it has seen, in the order of [`METRICS`].
+    /// One iteration; what it has seen, in the order of `metrics::METRICS`.
     ///
     /// # Errors
     /// What `check` returns, [`Error::Failed`] when a number is none any more. The state is of no use then.

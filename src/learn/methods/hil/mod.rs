@@ -1,12 +1,14 @@
 //! Algorithm 1: hybrid imitation learning. Pure behavior cloning, pure state cloning and a fixed mixture are the same loop with
 //! another alpha.
 
-use super::batches::Batches;
-use super::descent::{self, Descent};
-use super::fine_tuning::{self, FineTuning};
+mod method;
+mod metrics;
+mod warm_start;
+
+use super::descent::Descent;
+use super::fine_tuning::FineTuning;
 use super::inputs::Inputs;
-use super::mixing::{Averages, Mixing};
-use super::validation::validate;
+use super::mixing::Mixing;
 use crate::config::{ActionChoice, Alpha, FingerCloning, TrainSettings};
 use crate::error::{Error, Result};
 use crate::interrupt::Interrupt;
@@ -14,15 +16,12 @@ use crate::learn::limits::{affordable, before_the_first_update};
 use crate::learn::losses::behavior_cloning::{self as bc, draw_noise};
 use crate::learn::losses::state_cloning::{self as sc, Pushes, Segment, draw_segments};
 use crate::learn::losses::{Acted, behavior_cloning, state_cloning};
-use crate::learn::models::{Corpus, Dynamics, Policy, PolicySamples, Reader};
-use crate::learn::run::past::{MOST_UPDATES, at_most};
-use crate::learn::run::{EpochMetrics, Mean, Method, Metric, Saved, Stage};
+use crate::learn::models::{Corpus, Dynamics, Policy, PolicySamples};
+use crate::learn::run::{EpochMetrics, Mean, Stage};
 use crate::nn::cosine;
 use crate::seed::stream;
 use crate::state::JOINTS;
 use rand::seq::SliceRandom;
-use serde::{Deserialize, Serialize};
-use serde_json::{Value, json};
 
 /// Behavior cloning alone, before Algorithm 1: d_conv passes .9 within a few hundred updates of Algorithm 1, which starves L_BC before
 /// the rare phases of a task are learned.
@@ -118,9 +117,9 @@ impl Hil {
 
     /// An epoch of Algorithm 1.
     fn hybrid_imitation_learning(&mut self, stage: Stage, epoch: u64, interrupt: &Interrupt) -> Result<EpochMetrics> {
-        let (per_epoch, mut order) = (per_epoch(&self.inputs.train, &self.settings), self.shuffled(epoch));
+        let (per_epoch, order) = (per_epoch(&self.inputs.train, &self.settings), self.shuffled(epoch));
         let (first, last, steps) = (self.settings.learning_rate, self.settings.final_learning_rate, stage.epochs * per_epoch);
-        let (mut row, mut means) = (EpochMetrics::new(HIL, epoch + 1, stage.epochs), [Mean::default(); 6]);
+        let (mut row, mut means) = (EpochMetrics::new(HIL, epoch + 1, stage.epochs), [Mean::default(); 5]);
         let (mut l_model, mut rate) = (Mean::default(), f64::NAN);
         for (i, demos) in order.chunks(self.settings.batch.min(order.len())).enumerate() {
             interrupt.check()?;
@@ -136,7 +135,7 @@ impl Hil {
         names.iter().zip(means).for_each(|(name, mean)| row.set(name, mean.get()));
         row.set("l_model", l_model.get());
         row.set("learning_rate", rate);
-        self.order = (std::mem::take(&mut order), epoch + 1);
+        self.order = (order, epoch + 1);
         Ok(row)
     }
 
@@ -201,44 +200,6 @@ impl Hil {
         Ok(Update { l_bc: l_bc.value, l_sc, l_mix: l_mix.value(), d_conv, alpha, l_model })
     }
 
-    /// An epoch of the warm start: pairs shuffled across demos.
-    fn warm_start(&mut self, stage: Stage, epoch: u64, interrupt: &Interrupt) -> Result<EpochMetrics> {
-        let total = self.settings.warm_start_updates;
-        let (first, last) = (self.settings.warm_start_learning_rate, self.settings.final_learning_rate);
-        let batches = Batches::new(&self.inputs.train, self.settings.bc_batch);
-        let shuffled = batches.shuffled(&mut stream(self.seed, "train.warm-start", epoch));
-        let (mut l_bc, mut d_conv, mut rate) = (Mean::default(), Mean::default(), f64::NAN);
-        for rows in shuffled.iter().take(total.saturating_sub(self.descent.updates) as usize) {
-            interrupt.check()?;
-            rate = cosine(first, last, self.descent.updates, total);
-            let cloned = self.clone_behavior(rows, rate)?;
-            l_bc.add(cloned.l_bc);
-            d_conv.add(cloned.d_conv);
-        }
-        let mut row = EpochMetrics::new(WARM_START, epoch + 1, stage.epochs);
-        let values = [l_bc.get(), l_bc.get(), d_conv.get(), 0.0, rate];
-        ["l_bc", "l_mix", "d_conv", "alpha", "learning_rate"].iter().zip(values).for_each(|(name, value)| row.set(name, value));
-        Ok(row)
-    }
-
-    /// One update of behavior cloning alone (Algorithm 2) on the transitions `rows` of training demos.
-    ///
-    /// # Errors
-    /// [`Error::Failed`] when the loss is not a number.
-    pub fn clone_behavior(&mut self, rows: &[usize], learning_rate: f64) -> Result<Update> {
-        self.draws += 1;
-        let finite = self.judge();
-        let (corpus, descent, Work { acted, bc_choices, bc, .. }) = (&self.inputs.train, &mut self.descent, &mut self.work);
-        let samples = PolicySamples { corpus, policy: &descent.policy };
-        acted.forward(samples, rows);
-        let batch = bc::Batch { samples, rows, demos: rows.len() as f64 / corpus.mean_length() };
-        let mut rng = stream(self.seed, "train.bc", self.draws);
-        let (l_bc, d_conv) = behavior_cloning(acted, batch, bc_choices, &mut rng, bc);
-        finite(l_bc.name, l_bc.value, BC_REMEDY)?;
-        descent.update(acted, 1.0 * l_bc, learning_rate);
-        Ok(Update { l_bc: l_bc.value, l_sc: f64::NAN, l_mix: l_bc.value, d_conv, alpha: 0.0, l_model: f64::NAN })
-    }
-
     /// The order of the demos in an epoch.
     fn shuffled(&mut self, epoch: u64) -> Vec<usize> {
         let (mut order, mut shuffles) = std::mem::take(&mut self.order);
@@ -260,19 +221,6 @@ impl Hil {
             }
             false => Err(Error::Failed(format!("{term} is {value} after {updates} updates of the stage: {remedy}"))),
         }
-    }
-
-    /// An epoch in which every update was left out teaches nothing, nor will the next.
-    fn refuse_standstill(&self, row: &EpochMetrics, (updates, skipped): (u64, u64)) -> Result<()> {
-        let (made, left_out) = (self.descent.updates - updates, self.descent.skipped - skipped);
-        if left_out < made || made == 0 {
-            return Ok(());
-        }
-        let (term, place, last) = (self.descent.left_out, row.place(), row.updates);
-        Err(Error::Failed(format!(
-            "the gradient of {term} was not finite in any of the {made} updates of {place} (to update {last}): raise train.rho, set \
-             train.clip_norm or lower train.learning_rate"
-        )))
     }
 
     /// The training demos.
@@ -306,100 +254,6 @@ fn with_a_teacher_for_the_fingers(settings: &TrainSettings, alpha: Alpha) -> Tra
     let left_to_bc = settings.sc_fingers == FingerCloning::Following && alpha == Alpha::Fixed(1.0);
     TrainSettings { sc_fingers: if left_to_bc { FingerCloning::All } else { settings.sc_fingers }, ..settings.clone() }
 }
-
-/// What of [`Hil`] is no array.
-#[derive(Clone, Debug, Serialize, Deserialize)]
-struct Counts {
-    draws: u64,
-    descent: descent::Counts,
-    /// Steps of the dynamics network's optimiser.
-    model: Option<u32>,
-    averages: Averages,
-}
-
-impl Method for Hil {
-    fn stages(&self) -> Vec<Stage> {
-        let updates = self.settings.warm_start_updates;
-        let of_warm_start = Batches::new(&self.inputs.train, self.settings.bc_batch).per_epoch();
-        let epochs = self.settings.epochs_of(per_epoch(&self.inputs.train, &self.settings));
-        vec![Stage { name: WARM_START, epochs: updates.div_ceil(of_warm_start) }, Stage { name: HIL, epochs }]
-    }
-
-    fn metrics(&self) -> &'static [Metric] {
-        &super::hil_metrics::METRICS
-    }
-
-    fn begin(&mut self, stage: &str) {
-        self.descent.begin_stage();
-        if stage == HIL {
-            self.mixing.averages = Averages::default();
-        }
-    }
-
-    fn epoch(&mut self, stage: Stage, epoch: u64, interrupt: &Interrupt) -> Result<EpochMetrics> {
-        let before = (self.descent.updates, self.descent.skipped);
-        let mut row = match stage.name {
-            WARM_START => self.warm_start(stage, epoch, interrupt)?,
-            _ => self.hybrid_imitation_learning(stage, epoch, interrupt)?,
-        };
-        row.updates = self.descent.updates;
-        row.set("skipped_updates", self.descent.skipped as f64);
-        self.descent.update_averaged();
-        let mut rng = stream(self.seed, "train.validate", self.draws);
-        validate(
-            &self.descent.averaged,
-            &self.inputs.validation,
-            &self.work.bc_choices,
-            self.model.as_mut(),
-            &mut rng,
-            &mut row,
-        )?;
-        self.refuse_standstill(&row, before)?;
-        Ok(row)
-    }
-
-    fn end(&mut self, _stage: &str) {
-        self.descent.end_stage();
-    }
-
-    fn candidate(&self) -> &Policy {
-        &self.descent.averaged
-    }
-
-    fn save(&self) -> Saved {
-        let mut tensors = Vec::new();
-        let descent = self.descent.save(&mut tensors);
-        let model = self.model.as_ref().map(|model| model.save(&mut tensors));
-        let counts = Counts { draws: self.draws, descent, model, averages: self.mixing.averages };
-        Saved { tensors, counts: json!(counts) }
-    }
-
-    fn restore(&mut self, counts: &Value, tensors: &Reader, last: &EpochMetrics) -> std::result::Result<(), String> {
-        let counts = Counts::deserialize(counts).map_err(|why| format!("its counts: {why}"))?;
-        at_most("draws", counts.draws, MOST_UPDATES)?;
-        counts.averages.check()?;
-        self.descent.restore(tensors, &counts.descent, (last.updates, last.get("skipped_updates") as u64))?;
-        if let Some(model) = &mut self.model {
-            model.restore(tensors, counts.model.ok_or("it was made without a dynamics network")?)?;
-        }
-        (self.draws, self.mixing.averages) = (counts.draws, counts.averages);
-        Ok(())
-    }
-
-    fn remedy(&self, tensor: &str) -> (&'static str, &'static str) {
-        if tensor.starts_with(fine_tuning::NET) {
-            ("the dynamics network (Eq. 6)", MODEL_REMEDY)
-        } else {
-            ("the policy (L_mix, Eq. 1)", POLICY_REMEDY)
-        }
-    }
-
-    fn finish(self: Box<Self>) -> (Policy, Option<Dynamics>) {
-        (self.descent.policy, self.model.map(|model| model.dynamics))
-    }
-}
-
-const POLICY_REMEDY: &str = "lower train.learning_rate or train.warm_start_learning_rate, or set train.clip_norm";
 
 #[cfg(test)]
 mod tests {
