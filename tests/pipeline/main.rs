@@ -11,6 +11,7 @@ mod interrupted;
 mod kills;
 mod leaks;
 mod places;
+mod ppo;
 mod reproducible;
 mod resume;
 mod runs;

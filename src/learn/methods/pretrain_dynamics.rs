@@ -68,18 +68,10 @@ pub fn pretrain_dynamics<'a>(
 }
 
 /// The numbers of an epoch.
-const METRICS: [Metric; 3] = [
-    Metric { name: "learning_rate", doc: "Learning rate of the epoch's last update", label: None },
-    Metric {
-        name: "l_model",
-        doc: "Loss of the dynamics network (Eq. 6), mean over the epoch's updates",
-        label: Some("l_model"),
-    },
-    Metric {
-        name: "validation_l_model",
-        doc: "Loss of the dynamics network on the validation demos",
-        label: Some("validation l_model"),
-    },
+static METRICS: [Metric; 3] = [
+    Metric::column("learning_rate", "Learning rate of the epoch's last update"),
+    Metric::shown("l_model", "l_model", "Loss of the dynamics network (Eq. 6), mean over the epoch's updates"),
+    Metric::shown("validation_l_model", "validation l_model", "Loss of the dynamics network on the validation demos"),
 ];
 
 const TERM: &str = "the loss of the dynamics network (Eq. 6)";

@@ -16,6 +16,18 @@ pub struct Metric {
     pub label: Option<&'static str>,
 }
 
+impl Metric {
+    /// In the table, and on a terminal by this label.
+    pub const fn shown(name: &'static str, label: &'static str, doc: &'static str) -> Metric {
+        Metric { name, doc, label: Some(label) }
+    }
+
+    /// In the table only.
+    pub const fn column(name: &'static str, doc: &'static str) -> Metric {
+        Metric { name, doc, label: None }
+    }
+}
+
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(transparent)]
 struct Exact(#[serde(with = "exact")] f64);

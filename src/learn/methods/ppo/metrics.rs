@@ -6,28 +6,20 @@ use crate::learn::run::Metric;
 
 /// The numbers of an iteration.
 pub static METRICS: [Metric; 13] = [
-    column("env_steps", "Control steps of all worlds so far"),
-    column("episodes", "Episodes that ended in the iteration"),
-    shown("mean_return", "return", "Mean sum of rewards of these episodes"),
-    shown("mean_length", "length", "Mean number of control steps of these episodes"),
-    shown("success_rate", "success", "Share of these episodes that were solved, by sampled actions"),
-    shown("kl", "kl", "Divergence from the policy that acted, at the last update"),
-    shown("entropy", "entropy", "Entropy of the actions, in the policy's units (nats)"),
-    column("clipped", "Share of steps beyond the clip, mean over the updates"),
-    column("policy_loss", "Minus the clipped objective, mean over the updates"),
-    column("value_loss", "Loss of the value network, mean over the updates"),
-    shown("explained", "explained", "Share of the returns' variance that the value network had foreseen"),
-    column("iteration_updates", "Updates of the iteration"),
-    column("learning_rate", "Learning rate of the policy"),
+    Metric::column("env_steps", "Control steps of all worlds so far"),
+    Metric::column("episodes", "Episodes that ended in the iteration"),
+    Metric::shown("mean_return", "return", "Mean sum of rewards of these episodes"),
+    Metric::shown("mean_length", "length", "Mean number of control steps of these episodes"),
+    Metric::shown("success_rate", "success", "Share of these episodes that were solved, by sampled actions"),
+    Metric::shown("kl", "kl", "Divergence from the policy that acted, at the last update"),
+    Metric::shown("entropy", "entropy", "Entropy of the actions, in the policy's units (nats)"),
+    Metric::column("clipped", "Share of steps beyond the clip, mean over the updates"),
+    Metric::column("policy_loss", "Minus the clipped objective, mean over the updates"),
+    Metric::column("value_loss", "Loss of the value network, mean over the updates"),
+    Metric::shown("explained", "explained", "Share of the returns' variance that the value network had foreseen"),
+    Metric::column("iteration_updates", "Updates of the iteration"),
+    Metric::column("learning_rate", "Learning rate of the policy"),
 ];
-
-const fn shown(name: &'static str, label: &'static str, doc: &'static str) -> Metric {
-    Metric { name, doc, label: Some(label) }
-}
-
-const fn column(name: &'static str, doc: &'static str) -> Metric {
-    Metric { name, doc, label: None }
-}
 
 /// The numbers of an iteration in the order of [`METRICS`]; NaN where there is none.
 pub type Row = [f64; 13];
