@@ -7,7 +7,7 @@ use clap::ValueEnum;
 use hilt::config::Stage;
 use hilt::data::{dataset, json_file, table_file};
 use hilt::eval::Summary;
-use hilt::table::Values;
+use hilt::experiment::results;
 use std::path::Path;
 
 /// What is compared.
@@ -171,13 +171,8 @@ fn episodes(root: &Path) -> Result<u64> {
     info["total_episodes"].as_u64().with_context(|| format!("{} does not count its episodes", path.display()))
 }
 
-/// Updates of all stages of a training: each stage counts from 1, so the last of each.
+/// Updates of all stages of a training.
 fn updates(policy: &Done) -> Result<u64> {
     let (table, _) = table_file::read(&policy.dir.join("policy.training.parquet"))?;
-    let columns = (table.column("stage").map(|c| &c.values), table.column("updates").map(|c| &c.values));
-    let (Some(Values::Text(stages)), Some(Values::I64(updates))) = columns else {
-        anyhow::bail!("{}: policy.training.parquet counts no updates", policy.dir.display());
-    };
-    let last_of_stage = |i: &usize| stages.get(i + 1).is_none_or(|next| *next != stages[*i]);
-    Ok((0..stages.len()).filter(last_of_stage).map(|i| updates[i].max(0) as u64).sum())
+    results::updates(&table).with_context(|| format!("{}: policy.training.parquet counts no updates", policy.dir.display()))
 }

@@ -61,15 +61,6 @@ impl Grid {
         check_apart(experiment, &runs)?;
         Ok(Grid { steps: builder.steps, runs })
     }
-
-    /// For each step the steps that need it.
-    pub fn needed_by(&self) -> Vec<Vec<usize>> {
-        let mut needed = vec![Vec::new(); self.steps.len()];
-        for (i, step) in self.steps.iter().enumerate() {
-            step.needs().for_each(|from| needed[from].push(i));
-        }
-        needed
-    }
 }
 
 /// The variations; one without a name where there are none.

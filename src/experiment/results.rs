@@ -5,6 +5,7 @@ use super::estimate::wall_s_of;
 use super::runs::{Grid, Run};
 use super::state::Contents;
 use super::step::Step;
+use super::wording::TAKES;
 use crate::data::{json_file, table_file};
 use crate::error::{Error, Result};
 use crate::eval::Summary;
@@ -54,8 +55,8 @@ fn row<'a>(run: &'a Run, train: &Step, evaluate: &Step) -> Result<Row<'a>> {
     Ok(Row { run, summary, updates: updates.ok_or_else(|| Error::input(metrics, "counts no updates; train again"))? })
 }
 
-/// Updates of all stages of a training: each stage counts from 1, so the last of each.
-fn updates(metrics: &Table) -> Option<u64> {
+/// Updates of all stages of a training, by its metrics: each stage counts from 1, so the last of each. `None` for another table.
+pub fn updates(metrics: &Table) -> Option<u64> {
     let (Values::Text(stages), Values::I64(updates)) = (&metrics.column("stage")?.values, &metrics.column("updates")?.values)
     else {
         return None;
@@ -76,7 +77,7 @@ pub fn to_csv(rows: &[Row], grid: &Grid) -> String {
             text,
             "{task},{preset},{variation},{method},{seed},{episodes},{successes},{success_rate},{low},{high},{updates},{classes},{directory}"
         )
-        .expect("a text takes all that is written to it");
+        .expect(TAKES);
     }
     text
 }
@@ -87,7 +88,7 @@ pub fn times_csv(grid: &Grid, contents: &Contents) -> String {
     for (step, _) in grid.steps.iter().zip(contents).filter(|(_, content)| content.is_some()) {
         if let Some(wall_s) = wall_s_of(&step.log) {
             let Step { id, stage, task, seed, .. } = step;
-            writeln!(text, "{id},{},{task},{seed},{wall_s}", stage.name()).expect("a text takes all that is written to it");
+            writeln!(text, "{id},{},{task},{seed},{wall_s}", stage.name()).expect(TAKES);
         }
     }
     text

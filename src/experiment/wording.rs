@@ -7,6 +7,9 @@ use std::collections::BTreeSet;
 /// A directory's name is shorter than 256 bytes everywhere; nobody types so many.
 const LONGEST_NAME: usize = 64;
 
+/// Why writing into a text cannot fail.
+pub(super) const TAKES: &str = "a text takes all that is written to it";
+
 pub(super) fn parsed<T: std::str::FromStr<Err = String>>(words: &[String]) -> std::result::Result<Vec<T>, String> {
     words.iter().map(|word| word.parse()).collect()
 }

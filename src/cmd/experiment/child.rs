@@ -7,13 +7,21 @@ use crate::experiment::Step;
 use rustix::process::{Pid, Signal, kill_process};
 use std::fs::File;
 use std::io::{Read, Seek, Write};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::{Child, Command, ExitStatus, Stdio};
 use std::thread::sleep;
 use std::time::Duration;
 
 /// How often a step is asked whether it has ended.
 const TICK: Duration = Duration::from_millis(10);
+
+/// The program that runs steps: this one.
+///
+/// # Errors
+/// [`Error::Failed`] when the system does not tell where it is.
+pub fn own_binary() -> Result<PathBuf> {
+    std::env::current_exe().map_err(|e| Error::Failed(format!("cannot find the own binary: {e}")))
+}
 
 /// Runs a step to its end; `Err` has the last words of one that failed. An interrupt is passed on to it, once.
 pub fn run(binary: &Path, step: &Step, threads: usize, lock: &Lock, context: &Context) -> Result<()> {

@@ -2,6 +2,7 @@
 
 use super::args::Program;
 use super::checked::Checked;
+use super::child;
 use crate::cmd::{Context, output};
 use crate::data::atomic;
 use crate::error::{Error, Result};
@@ -86,7 +87,7 @@ pub fn emit(checked: &Checked, program: Program, context: &Context) -> Result<()
     };
     let out = checked.args.out.clone().unwrap_or_else(|| checked.dir.join(name));
     refuse_foreign(&out, emit::MARK)?;
-    let binary = std::env::current_exe().map_err(|e| Error::Failed(format!("cannot find the own binary: {e}")))?;
+    let binary = child::own_binary()?;
     let hilt = binary.display().to_string();
     let collect = collecting(checked);
     let site =

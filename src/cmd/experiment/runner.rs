@@ -16,7 +16,7 @@ use std::time::Instant;
 const NAMED: usize = 10;
 
 pub fn run(checked: &Checked, contents: Contents, lock: Lock, context: &Context) -> Result<Outcome> {
-    let binary = std::env::current_exe().map_err(|e| Error::Failed(format!("cannot find the own binary: {e}")))?;
+    let binary = child::own_binary()?;
     let left = contents.iter().filter(|content| content.is_none()).count();
     announce(checked, &contents, left, context);
     let runner =

@@ -2,6 +2,7 @@
 
 use super::super::runs::Grid;
 use super::super::step::Step;
+use super::super::wording::TAKES;
 use super::{MARK, Site, line, quoted};
 use crate::config::Stage;
 use std::fmt::Write;
@@ -71,9 +72,6 @@ pub fn slurm(grid: &Grid, site: &Site) -> String {
     text += "submit collect 1 \"$@\"\n";
     text
 }
-
-/// A text takes all that is written to it.
-const TAKES: &str = "a text takes all that is written to it";
 
 fn cases(text: &mut String, stage: Stage, steps: &[&Step]) {
     write!(text, "\n{}() {{\n    case $1 in\n", stage.name()).expect(TAKES);

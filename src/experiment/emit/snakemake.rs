@@ -3,6 +3,7 @@
 use super::super::results::RESULTS;
 use super::super::runs::Grid;
 use super::super::step::{Output, Step};
+use super::super::wording::TAKES;
 use super::{MARK, Site, line};
 use std::fmt::Write;
 use std::path::Path;
@@ -31,9 +32,6 @@ pub fn snakemake(grid: &Grid, site: &Site) -> String {
     text
 }
 
-/// A text takes all that is written to it.
-const TAKES: &str = "a text takes all that is written to it";
-
 fn rule(text: &mut String, number: usize, step: &Step, threads: usize) {
     write!(text, "rule {}_{number}:\n    # {}\n", step.stage.name(), step.id).expect(TAKES);
     if !step.inputs.is_empty() {
@@ -47,7 +45,7 @@ fn rule(text: &mut String, number: usize, step: &Step, threads: usize) {
         writeln!(text, "        {},", output_of(output)).expect(TAKES);
     }
     let marker = "THREADS-OF-THE-RULE";
-    let command = line(&step.command(marker)).replace('{', "{{").replace('}', "}}").replace(marker, "{threads}");
+    let command = escaped(&line(&step.command(marker))).replace(marker, "{threads}");
     let command = literal(&format!("{{HILT:q}} {command} > /dev/null"));
     let log = literal_path(&step.log);
     write!(text, "    log:\n        {log},\n    threads: {threads}\n    shell:\n        {command}\n\n\n").expect(TAKES);
@@ -60,12 +58,17 @@ fn output_of(output: &Output) -> String {
 
 /// A command without names of Snakemake in it.
 fn shell(line: &str) -> String {
-    literal(&format!("{{HILT:q}} {}", line.replace('{', "{{").replace('}', "}}")))
+    literal(&format!("{{HILT:q}} {}", escaped(line)))
 }
 
 /// Braces in a name would be a wildcard.
 fn literal_path(path: &Path) -> String {
-    literal(&path.display().to_string().replace('{', "{{").replace('}', "}}"))
+    literal(&escaped(&path.display().to_string()))
+}
+
+/// Braces that are none of Snakemake's.
+fn escaped(text: &str) -> String {
+    text.replace('{', "{{").replace('}', "}}")
 }
 
 /// A text as Python writes it: as JSON does.

@@ -4,7 +4,6 @@ use super::optimizer::{Optimizer, Steps};
 use crate::config::TrainSettings;
 use crate::learn::losses::{Acted, Mixture};
 use crate::learn::models::{Policy, Reader, vector};
-use crate::learn::run::past::at_most;
 use crate::math::ln;
 use crate::nn::{clip_by_global_norm, gaussian, global_norm};
 use crate::tensor::NamedTensor;
@@ -12,8 +11,6 @@ use serde::{Deserialize, Serialize};
 
 /// Norm of a gradient above which Adam's second moment, a square, would not fit into an f32.
 const LARGEST_NORM: f64 = 1e19;
-/// Most steps of an optimiser, which counts them in 32 bits.
-const MOST_STEPS: u32 = 1 << 31;
 
 /// What the names of the saved arrays begin with.
 const NET: &str = "policy.net";
@@ -113,16 +110,9 @@ impl Descent {
 
     /// The loss whose gradient is no use.
     fn unusable(&mut self, acted: &mut Acted, l_mix: Mixture) -> &'static str {
-        let mut name = "";
-        for (_, loss) in l_mix.terms() {
-            name = loss.name;
-            let alone = 1.0 * loss;
-            if self.gradient_norm(acted, alone) <= LARGEST_NORM && usable(&alone.d_log_std()) {
-                continue;
-            }
-            break;
-        }
-        name
+        let mut unusable = |alone| !(self.gradient_norm(acted, alone) <= LARGEST_NORM && usable(&alone.d_log_std()));
+        let culprit = l_mix.terms().find(|(_, loss)| unusable(1.0 * *loss)).or_else(|| l_mix.terms().last());
+        culprit.map_or("", |(_, loss)| loss.name)
     }
 
     /// All that changes from update to update.
@@ -141,10 +131,6 @@ impl Descent {
         if (counts.updates, counts.skipped) != (updates, skipped) {
             let (ours, left_out) = (counts.updates, counts.skipped);
             return Err(format!("it counts {ours} updates and {left_out} left out, its last epoch {updates} and {skipped}"));
-        }
-        for steps in [counts.net, counts.std] {
-            at_most("steps of an optimiser", steps.adam, MOST_STEPS)?;
-            at_most("steps of an average", steps.ema, MOST_STEPS)?;
         }
         let (net, std) = (self.policy.net.params().len(), self.policy.log_std.len());
         self.policy.net.params_mut().copy_from_slice(&reader.tensor(NET, &[net])?);

@@ -1,9 +1,13 @@
 //! Adam and the averaged weights of one parameter vector, and both as named arrays.
 
 use crate::learn::models::{Reader, vector};
+use crate::learn::run::past::at_most;
 use crate::nn::{Adam, Ema};
 use crate::tensor::NamedTensor;
 use serde::{Deserialize, Serialize};
+
+/// Most steps of an optimiser, which counts them in 32 bits.
+const MOST_STEPS: u32 = 1 << 31;
 
 /// A parameter vector's way down.
 pub struct Optimizer {
@@ -57,6 +61,7 @@ impl Optimizer {
     /// # Errors
     /// Says what is missing or does not fit.
     pub fn restore(reader: &Reader, name: &str, len: usize, decay: f64, steps: Steps) -> Result<Self, String> {
+        at_most("steps of an average", steps.ema, MOST_STEPS)?;
         let average = reader.tensor(&format!("{name}.average"), &[len])?;
         Ok(Optimizer { adam: read_adam(reader, name, len, steps.adam)?, ema: Ema::from_state(average, decay, steps.ema) })
     }
@@ -73,10 +78,26 @@ pub fn push_adam(out: &mut Vec<NamedTensor>, name: &str, adam: &Adam) {
 /// # Errors
 /// Says what is missing or does not fit.
 pub fn read_adam(reader: &Reader, name: &str, len: usize, steps: u32) -> Result<Adam, String> {
+    at_most("steps of an optimiser", steps, MOST_STEPS)?;
     let first = reader.tensor(&format!("{name}.first_moment"), &[len])?;
     let second = reader.tensor(&format!("{name}.second_moment"), &[len])?;
     match second.iter().find(|v| **v < 0.0) {
         Some(v) => Err(format!("tensor {name}.second_moment holds {v}; means of squares are 0 or more")),
         None => Ok(Adam::from_state(first, second, steps)),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use serde_json::json;
+
+    #[test]
+    fn steps_beyond_what_an_optimiser_counts_are_refused() {
+        let (mut tensors, meta) = (Vec::new(), json!({}));
+        push_adam(&mut tensors, "net", &Adam::new(2));
+        let read = |steps| read_adam(&Reader { tensors: &tensors, meta: &meta }, "net", 2, steps);
+        assert!(read(MOST_STEPS).is_ok());
+        assert!(read(MOST_STEPS + 1).expect_err("refused").contains("steps of an optimiser"));
     }
 }

@@ -44,8 +44,8 @@ impl Checkpoint {
     pub fn restore(&self, method: &mut dyn Method) -> Result<History, String> {
         let reader = Reader { tensors: &self.tensors, meta: &self.meta };
         let mut history = History { rows: reader.meta("epochs")?, selection: reader.meta("selection")?, best: None };
-        let last = past::check(&history, &method.stages())?;
-        method.restore(&reader.meta("counts")?, &reader, last)?;
+        past::check(&history, &method.stages())?;
+        method.restore(&reader.meta("counts")?, &reader, &history.rows)?;
         if history.selection.best().is_some() {
             let best = |tensor: &NamedTensor| {
                 let name = tensor.name.strip_prefix(BEST)?;

@@ -52,11 +52,11 @@ pub trait Method {
     /// Its state between two epochs.
     fn save(&self) -> Saved;
 
-    /// Takes up the state after the epoch `last` of a run with the same inputs, settings and seed.
+    /// Takes up the state after the last of the epochs `past` (at least one) of a run with the same inputs, settings and seed.
     ///
     /// # Errors
     /// Says what is missing, does not fit or cannot be.
-    fn restore(&mut self, counts: &Value, tensors: &Reader, last: &EpochMetrics) -> std::result::Result<(), String>;
+    fn restore(&mut self, counts: &Value, tensors: &Reader, past: &[EpochMetrics]) -> std::result::Result<(), String>;
 
     /// What a saved tensor belongs to, and what to change when it is no longer finite.
     fn remedy(&self, tensor: &str) -> (&'static str, &'static str);

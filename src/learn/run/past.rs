@@ -10,16 +10,17 @@ pub const MOST_UPDATES: u64 = 1_000_000_000_000;
 /// Most episodes that candidates are rolled out on, as `train.select_episodes` is allowed.
 const MOST_EPISODES: u64 = 100_000;
 
-/// Refuses epochs and candidates that no run of these stages leaves behind; the last epoch.
+/// Refuses epochs and candidates that no run of these stages leaves behind.
 ///
 /// # Errors
 /// Says which number is out of its limits.
-pub fn check<'a>(history: &'a History, stages: &[Stage]) -> Result<&'a EpochMetrics, String> {
-    let Some(last) = history.rows.last() else { return Err("it holds no epoch".into()) };
+pub fn check(history: &History, stages: &[Stage]) -> Result<(), String> {
+    if history.rows.is_empty() {
+        return Err("it holds no epoch".into());
+    }
     let before = [None].into_iter().chain(history.rows.iter().map(Some));
     before.zip(&history.rows).try_for_each(|(before, row)| follows(before, row, stages))?;
-    candidates(history)?;
-    Ok(last)
+    candidates(history)
 }
 
 /// Epochs come one after another, those of a stage after those of the stage before.

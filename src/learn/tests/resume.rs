@@ -202,7 +202,7 @@ fn a_checkpoint_of_a_past_that_cannot_be_is_refused_before_training_goes_on() {
     let kept = kept.expect("kept");
     let last = kept.meta["epochs"].as_array().map_or(0, Vec::len) - 1;
     let huge = Value::from(1_000_000_000_000_000u64);
-    let cases: [(String, Value); 13] = [
+    let cases: [(String, Value); 14] = [
         ("/epochs".into(), Value::Array(vec![])),
         (format!("/epochs/{last}/epochs"), 0.into()),
         (format!("/epochs/{last}/epoch"), 0.into()),
@@ -210,6 +210,7 @@ fn a_checkpoint_of_a_past_that_cannot_be_is_refused_before_training_goes_on() {
         (format!("/epochs/{last}/stage"), "pretrain".into()),
         (format!("/epochs/{last}/updates"), huge.clone()),
         (format!("/epochs/{last}/values/skipped_updates"), 1e18.into()),
+        ("/epochs/0/values/skipped_updates".into(), 1e15.into()),
         ("/counts/descent/updates".into(), 0.into()),
         ("/counts/draws".into(), u64::MAX.into()),
         ("/counts/descent/net/adam".into(), u32::MAX.into()),

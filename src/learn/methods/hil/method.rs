@@ -82,11 +82,16 @@ impl Method for Hil {
         Saved { tensors, counts: json!(counts) }
     }
 
-    fn restore(&mut self, counts: &Value, tensors: &Reader, last: &EpochMetrics) -> std::result::Result<(), String> {
+    fn restore(&mut self, counts: &Value, tensors: &Reader, past: &[EpochMetrics]) -> std::result::Result<(), String> {
         let counts = Counts::deserialize(counts).map_err(|why| format!("its counts: {why}"))?;
         at_most("draws", counts.draws, MOST_UPDATES)?;
         counts.averages.check()?;
-        self.descent.restore(tensors, &counts.descent, (last.updates, last.get("skipped_updates") as u64))?;
+        let skipped = |row: &EpochMetrics| row.get("skipped_updates") as u64;
+        if !past.is_sorted_by_key(skipped) {
+            return Err("the updates that it left out become fewer from one epoch to the next".into());
+        }
+        let last = past.last().ok_or("it holds no epoch")?;
+        self.descent.restore(tensors, &counts.descent, (last.updates, skipped(last)))?;
         if let Some(model) = &mut self.model {
             model.restore(tensors, counts.model.ok_or("it was made without a dynamics network")?)?;
         }

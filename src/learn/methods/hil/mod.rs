@@ -223,11 +223,6 @@ impl Hil {
         }
     }
 
-    /// The training demos.
-    pub fn corpus(&self) -> &Corpus {
-        &self.inputs.train
-    }
-
     /// The policy, to be spoilt.
     #[cfg(test)]
     pub fn policy_mut(&mut self) -> &mut Policy {

@@ -41,8 +41,9 @@ impl Method for Ppo {
         Saved { tensors, counts }
     }
 
-    fn restore(&mut self, counts: &Value, tensors: &Reader, last: &EpochMetrics) -> std::result::Result<(), String> {
-        Ppo::restore(self, tensors.tensors, counts).map_err(|why| why.to_string())?;
+    fn restore(&mut self, counts: &Value, tensors: &Reader, past: &[EpochMetrics]) -> std::result::Result<(), String> {
+        let last = past.last().ok_or("it holds no epoch")?;
+        Ppo::restore(self, &Reader { tensors: tensors.tensors, meta: counts })?;
         if (self.iteration, self.updates) != (last.epoch, last.updates) {
             return Err(format!(
                 "it counts {} iterations and {} updates, its {} {}",

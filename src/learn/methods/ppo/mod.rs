@@ -112,16 +112,6 @@ impl Ppo {
         Ok(learning)
     }
 
-    /// The policy as it is.
-    pub fn policy(&self) -> &Policy {
-        &self.policy
-    }
-
-    /// Iterations that are done.
-    pub fn iterations(&self) -> u64 {
-        self.iteration
-    }
-
     /// Control steps of all worlds so far.
     pub fn steps(&self) -> u64 {
         self.iteration * self.settings.batch()

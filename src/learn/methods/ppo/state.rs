@@ -2,10 +2,11 @@
 //! reset.
 
 use super::Ppo;
+use super::episodes::Episodes;
 use super::statistics::Statistics;
-use crate::error::{Error, Result};
-use crate::learn::methods::optimizer::read_adam;
+use crate::learn::methods::optimizer::{push_adam, read_adam};
 use crate::learn::models::{Reader, vector};
+use crate::learn::run::past::{MOST_UPDATES, at_most};
 use crate::state::JOINTS;
 use crate::tensor::NamedTensor;
 use rayon::prelude::*;
@@ -32,11 +33,7 @@ impl Ppo {
         let mut tensors =
             vec![vector(POLICY, self.policy.net.params()), vector(STD, &self.policy.log_std), vector(VALUE, self.value.params())];
         let adams = [(POLICY, &self.policy_adam), (STD, &self.std_adam), (VALUE, &self.value_adam)];
-        for (name, adam) in adams {
-            let (first, second, _) = adam.state();
-            tensors.push(vector(&format!("{name}.first_moment"), first));
-            tensors.push(vector(&format!("{name}.second_moment"), second));
-        }
+        adams.iter().for_each(|(name, adam)| push_adam(&mut tensors, name, adam));
         let worlds = || self.groups.iter().flat_map(|group| &group.worlds);
         let actions: Vec<f32> = worlds().flat_map(|world| world.actions.iter().copied()).collect();
         tensors.push(vector(ACTIONS, &actions));
@@ -54,12 +51,10 @@ impl Ppo {
     /// Puts a fresh one of the same run into the state that [`Ppo::save`] has returned.
     ///
     /// # Errors
-    /// [`Error::Failed`] says what is missing or does not fit; what an episode that is begun again returns. The state is of no use then.
-    pub fn restore(&mut self, tensors: &[NamedTensor], meta: &Value) -> Result<()> {
-        let misfit = |why: String| Error::Failed(format!("the checkpoint does not fit: {why}"));
-        let reader = Reader { tensors, meta };
-        self.restore_numbers(&reader).map_err(misfit)?;
-        let (places, actions) = self.places(&reader).map_err(misfit)?;
+    /// Says what is missing or does not fit, or why an episode cannot begin again. The state is of no use then.
+    pub fn restore(&mut self, reader: &Reader) -> Result<(), String> {
+        self.restore_numbers(reader)?;
+        let (places, actions) = self.places(reader)?;
         let worlds = self.groups.iter_mut().flat_map(|group| &mut group.worlds).collect::<Vec<_>>();
         let mut rest = actions.as_slice();
         let parts = worlds.into_iter().zip(places).map(|(world, place)| {
@@ -68,11 +63,12 @@ impl Ppo {
             (world, place, own)
         });
         let parts: Vec<_> = parts.collect();
-        let replayed: Vec<Result<()>> = parts.into_par_iter().map(|(world, place, own)| world.replay(place.begun, own)).collect();
-        replayed.into_iter().collect()
+        let replay = |(world, place, own): (&mut Episodes, Place, &[f32])| world.replay(place.begun, own);
+        let replayed: Vec<_> = parts.into_par_iter().map(replay).collect();
+        replayed.into_iter().collect::<crate::error::Result<()>>().map_err(|why| why.to_string())
     }
 
-    fn restore_numbers(&mut self, reader: &Reader) -> std::result::Result<(), String> {
+    fn restore_numbers(&mut self, reader: &Reader) -> Result<(), String> {
         let [policy, std, value]: [u32; 3] = reader.meta("adam_steps")?;
         let statistics: Statistics = reader.meta("statistics")?;
         if !statistics.fit(self.sight) {
@@ -93,7 +89,7 @@ impl Ppo {
     }
 
     /// Where the worlds stand, and the actions that led there.
-    fn places(&self, reader: &Reader) -> std::result::Result<(Vec<Place>, Vec<f32>), String> {
+    fn places(&self, reader: &Reader) -> Result<(Vec<Place>, Vec<f32>), String> {
         let places: Vec<Place> = reader.meta("worlds")?;
         if places.len() != self.settings.worlds {
             return Err(format!("it has {} worlds, this run {}", places.len(), self.settings.worlds));
@@ -102,6 +98,7 @@ impl Ppo {
         if let Some(wrong) = places.iter().find(|p| p.begun == 0 || p.steps > most) {
             return Err(format!("a world stands in step {} of episode {}; episodes have {most} steps", wrong.steps, wrong.begun));
         }
+        places.iter().try_for_each(|place| at_most("episodes of a world", place.begun, MOST_UPDATES))?;
         let steps: usize = places.iter().map(|p| p.steps).sum();
         let actions = reader.tensor(ACTIONS, &[steps * JOINTS])?;
         Ok((places, actions))

@@ -5,6 +5,7 @@ use super::objective::{Choices, Work};
 use super::toy::{GAMMA, Regulator, TASK, best_gain, cost};
 use super::*;
 use crate::config::{FeatureSet, PpoSettings, TrainSettings};
+use crate::learn::models::Reader;
 use crate::math::exp;
 use crate::nn::Lanes;
 
@@ -31,14 +32,14 @@ fn toy(settings: &TrainSettings) -> Ppo {
 fn it_finds_the_known_optimum_of_a_regulator() {
     let settings = settings();
     let mut ppo = toy(&settings);
-    while ppo.iterations() < settings.ppo.iterations() {
+    while ppo.iteration < settings.ppo.iterations() {
         ppo.iteration(&|| Ok(())).expect("an iteration");
     }
     let gain = best_gain() as f32;
     let best = cost(|seen| [-gain * seen[0], -gain * seen[1]]);
     let nothing = cost(|_| [0.0; 2]);
     let learned = cost(|seen| {
-        let action = ppo.policy().act(seen);
+        let action = ppo.policy.act(seen);
         [action[0], action[1]]
     });
     println!("cost: {learned} learned, {best} at best, {nothing} without moving");
@@ -77,7 +78,7 @@ fn threads_and_a_break_change_no_bit() {
     let (tensors, meta) = first.save();
     let meta = serde_json::from_str(&meta.to_string()).expect("what was written");
     let mut second = toy(&settings);
-    second.restore(&tensors, &meta).expect("a checkpoint of the same run");
+    second.restore(&Reader { tensors: &tensors, meta: &meta }).expect("a checkpoint of the same run");
     assert_eq!(second.steps(), 2 * settings.ppo.batch());
     metrics.extend(go_on(&mut second, 1));
     assert_eq!(whole, left_by(&second, &metrics));
@@ -92,11 +93,13 @@ fn a_checkpoint_that_does_not_fit_is_refused() {
     let said = |change: &dyn Fn(&mut Vec<crate::tensor::NamedTensor>, &mut serde_json::Value)| {
         let (mut tensors, mut meta) = (tensors.clone(), meta.clone());
         change(&mut tensors, &mut meta);
-        toy(&settings).restore(&tensors, &meta).expect_err("refused").to_string()
+        toy(&settings).restore(&Reader { tensors: &tensors, meta: &meta }).expect_err("refused")
     };
     assert!(said(&|tensors, _| tensors.truncate(2)).contains("policy.net.first_moment is missing"));
     assert!(said(&|_, meta| meta["worlds"] = serde_json::json!([])).contains("0 worlds, this run 16"));
     assert!(said(&|_, meta| meta["worlds"][3]["steps"] = 1000.into()).contains("step 1000"));
+    assert!(said(&|_, meta| meta["worlds"][3]["begun"] = u64::MAX.into()).contains("episodes of a world"));
+    assert!(said(&|_, meta| meta["adam_steps"][2] = u32::MAX.into()).contains("steps of an optimiser"));
     assert!(said(&|_, meta| meta["statistics"]["squares"][0] = (-1.0).into()).contains("statistics"));
 }
 
