@@ -3,9 +3,11 @@
 TASK   ?= pick-up
 RUNS   ?= runs
 SEED   ?= 0
-# best: every documented mend; paper: as literal as can work.
+# best: every documented mend; paper: as literal as can work; mended: paper with the fewest mends that reach its figures.
 PRESET ?= best
-PIPELINE ?= $(if $(filter paper,$(PRESET)),pipelines/paper/$(TASK).toml,pipelines/$(TASK).toml)
+PIPELINE_paper  = pipelines/paper/$(TASK).toml
+PIPELINE_mended = pipelines/mended.toml
+PIPELINE ?= $(or $(PIPELINE_$(PRESET)),pipelines/$(TASK).toml)
 # hil: hybrid imitation learning; bc: behavior cloning; sc: state cloning: all share the demos. ppo: reinforcement learning, which needs none.
 # Each has a policy of its own in RUNS/TASK.
 METHOD ?= hil
@@ -56,7 +58,7 @@ override JOBS       := $(strip $(call typed,JOBS))
 override THREADS    := $(strip $(call typed,THREADS))
 
 TASKS := pick-up pick-and-place stack
-PRESETS := best paper
+PRESETS := best mended paper
 METHODS := hil bc sc ppo
 EXPERIMENTS := $(patsubst pipelines/experiments/%.toml,%,$(wildcard pipelines/experiments/*.toml))
 

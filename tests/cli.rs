@@ -179,7 +179,7 @@ fn a_name_is_offered_when_it_is_near_whatever_its_case_and_none_when_nothing_is(
     set("Train.Rho=0.5", &["did you mean train.rho?"]);
     set("pretrain.activation=tan", &["did you mean tanh?"]);
     set("train.features=FK", &["did you mean fk?"]);
-    set("train.sc_fingers=folowing", &["did you mean following?"]);
+    set("train.sc.fingers=folowing", &["did you mean following?"]);
     let far = refused(&["settings", "--task", "stack", "--set", "xyzzy.foo=1"], 2);
     assert!(!far.contains("did you mean"), "{far}");
     says(&["plan", "--task", "stak"], 2, &["unknown task \"stak\"; did you mean stack? allowed: pick-up, pick-and-place, stack"]);
@@ -208,7 +208,7 @@ fn keys_values_and_files_beyond_their_limits_are_refused_at_once() {
         let stderr = refused(&["settings", "--task", "stack", "--set", words], 2);
         assert!(parts.iter().all(|part| stderr.contains(part)) && stderr.len() < 2000, "{stderr}");
     };
-    set(&format!("{}=1", ["a"; 60_000].join(".")), &["a key of 60000 parts; none has more than 3"]);
+    set(&format!("{}=1", ["a"; 60_000].join(".")), &["a key of 60000 parts; none has more than 4"]);
     set(&format!("plan.speed={}", "[".repeat(60_000)), &["not valid TOML", "recursion"]);
     set(&format!("plan.speed={}{}", "[".repeat(60_000), "]".repeat(60_000)), &["not valid TOML", "recursion"]);
     set(&format!("{}.b=1", "a".repeat(120_000)), &["unknown key aaa", "(120002 characters)"]);

@@ -71,7 +71,15 @@ fn reexecute(demos: &[Demo], pipeline: &Pipeline, seed: u64, context: &Context) 
         context.interrupt.check()?;
         let demo = &demos[(index / times) as usize];
         let rng = seed::stream(seed, "pretrain.reexecute", index);
-        let episode = sim::reexecute(index, demo, &pipeline.scene, &settings, rng, &context.interrupt)?;
+        let episode = sim::reexecute(
+            index,
+            demo,
+            &pipeline.scene,
+            &settings,
+            &pipeline.pretrain.reexecute_fingers,
+            rng,
+            &context.interrupt,
+        )?;
         progress.step();
         let what = format!("training demo {}", index / times);
         match episode.failure {

@@ -88,6 +88,9 @@ pub enum FingerCloning {
     /// Those that the demo's finger followed. A finger that holds the block does not answer to its command, but the dynamics network
     /// believes that it does.
     Following,
+    /// All, as if each finger integrated its command: the prediction is the network's, the gradient with respect to a finger's command goes
+    /// straight through to the finger (q' = q + dt a), for where a finger holds there is no slope that leads to opening it.
+    StraightThrough,
     /// None; L_SC leaves out the fingers' states too.
     None,
 }

@@ -1,58 +1,19 @@
 //! From a preset or a pipeline file and `--set` words to a checked [`Pipeline`].
 
 use super::ranges::Range;
-use super::{Pipeline, check};
+use super::{Pipeline, Preset, check};
 use crate::error::{Error, Result};
 use crate::interrupt;
 use crate::task::Task;
-use crate::words::{shown, unknown};
+use crate::words::shown;
 use std::fs::File;
 use std::io::Read;
 use std::path::{Path, PathBuf};
-use std::str::FromStr;
 
 /// A pipeline file with every key is 4 kB long; this leaves room for comments and boxes \[bytes\].
 const LONGEST_FILE: u64 = 1 << 20;
-/// Parts of a dotted key: stage, section, key.
-const MOST_PARTS: usize = 3;
-
-/// The pipeline files that the binary carries, so that it works from any directory.
-const BUILT_IN: [(Task, Preset, &str); 6] = [
-    (Task::PickUp, Preset::Best, include_str!("../../pipelines/pick-up.toml")),
-    (Task::PickAndPlace, Preset::Best, include_str!("../../pipelines/pick-and-place.toml")),
-    (Task::Stack, Preset::Best, include_str!("../../pipelines/stack.toml")),
-    (Task::PickUp, Preset::Paper, include_str!("../../pipelines/paper/pick-up.toml")),
-    (Task::PickAndPlace, Preset::Paper, include_str!("../../pipelines/paper/pick-and-place.toml")),
-    (Task::Stack, Preset::Paper, include_str!("../../pipelines/paper/stack.toml")),
-];
-
-/// Which of the two sets of settings that come with hilt.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Preset {
-    /// The method with every documented mend switched on.
-    #[default]
-    Best,
-    /// As literal as can work.
-    Paper,
-}
-
-impl Preset {
-    /// All presets.
-    pub const ALL: [Preset; 2] = [Preset::Best, Preset::Paper];
-
-    /// The name on the command line.
-    pub fn name(self) -> &'static str {
-        ["best", "paper"][self as usize]
-    }
-}
-
-impl FromStr for Preset {
-    type Err = String;
-
-    fn from_str(s: &str) -> std::result::Result<Self, String> {
-        Preset::ALL.into_iter().find(|p| p.name() == s).ok_or_else(|| unknown("preset", s, &Preset::ALL.map(Preset::name)))
-    }
-}
+/// Parts of a dotted key: stage, sections, key.
+const MOST_PARTS: usize = 4;
 
 /// Where settings come from before `--set` and flags.
 #[derive(Clone, Debug, PartialEq)]
@@ -72,19 +33,13 @@ impl Pipeline {
     pub fn load(source: &Source, sets: &[String]) -> Result<Pipeline> {
         let (origin, text, task) = match source {
             Source::BuiltIn(task, preset) => {
-                let (.., text) = BUILT_IN
-                    .iter()
-                    .find(|(t, p, _)| t == task && p == preset)
-                    .expect("every task has a built-in pipeline for every preset");
-                (format!("built-in pipeline {task} ({})", preset.name()), (*text).to_string(), Some(*task))
+                (format!("built-in pipeline {task} ({})", preset.name()), preset.text(*task).to_string(), Some(*task))
             }
             Source::File(path, task) => (path.display().to_string(), read(path)?, *task),
         };
-        let mut table: toml::Table = text.parse().map_err(|e: toml::de::Error| {
-            let why: Vec<String> = e.to_string().trim_end().lines().map(shown).collect();
-            Error::Usage(format!("{origin} is not valid TOML: {}", why.join("\n")))
-        })?;
-        agree_on_task(&mut table, task, &origin)?;
+        let mut own = parsed(&text, &origin)?;
+        agree_on_task(&mut own, task, &origin)?;
+        let mut table = extended(own, &origin)?;
         let mut pipeline = check::resolve(table.clone(), &origin)?;
         for set in sets {
             let origin = format!("--set {}", shown(set));
@@ -92,6 +47,41 @@ impl Pipeline {
             pipeline = check::resolve(table.clone(), &origin)?;
         }
         Ok(pipeline)
+    }
+}
+
+fn parsed(text: &str, origin: &str) -> Result<toml::Table> {
+    text.parse().map_err(|e: toml::de::Error| {
+        let why: Vec<String> = e.to_string().trim_end().lines().map(shown).collect();
+        Error::Usage(format!("{origin} is not valid TOML: {}", why.join("\n")))
+    })
+}
+
+/// The settings of the preset that a file `extends`, with the file's own over them. A preset may extend another.
+fn extended(mut own: toml::Table, origin: &str) -> Result<toml::Table> {
+    let Some(name) = own.remove("extends") else {
+        return Ok(own);
+    };
+    let refuse = |why: String| Error::Usage(format!("{origin}: extends: {why}"));
+    let name = name.as_str().ok_or_else(|| refuse(format!("{} is no preset's name in quotes", shown(&name.to_string()))))?;
+    let preset: Preset = name.parse().map_err(refuse)?;
+    let Some(task) = own.get("task").and_then(toml::Value::as_str).and_then(|task| task.parse().ok()) else {
+        return Ok(own); // what is wrong with the task is said where the settings are checked
+    };
+    let mut table = extended(parsed(preset.text(task), preset.name())?, preset.name())?;
+    lay_over(&mut table, own);
+    Ok(table)
+}
+
+/// Puts `own` over `table`, key by key.
+fn lay_over(table: &mut toml::Table, own: toml::Table) {
+    for (key, value) in own {
+        match (table.get_mut(&key), value) {
+            (Some(toml::Value::Table(inner)), toml::Value::Table(value)) => lay_over(inner, value),
+            (_, value) => {
+                table.insert(key, value);
+            }
+        }
     }
 }
 

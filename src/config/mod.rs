@@ -7,8 +7,10 @@ mod data;
 mod limits;
 mod load;
 mod ppo;
+mod preset;
 mod pretrain;
 mod ranges;
+mod sc;
 mod scene;
 mod train;
 
@@ -16,11 +18,13 @@ pub use choices::{
     ActionChoice, Alpha, Convergence, FeatureSet, FingerCloning, ModelLoss, Objective, Pairs, StateScale, Structure,
 };
 pub use data::{ConvertSettings, EvaluateSettings};
-pub use load::{Preset, Source};
+pub use load::Source;
 pub use ppo::{PpoSettings, RewardKind};
+pub use preset::Preset;
 pub use pretrain::PretrainSettings;
 pub use ranges::{MOST_LAYERS, MOST_STEPS, MOST_UNITS};
-pub use scene::{PlanSettings, PulseSettings, SceneSettings, SimulateSettings, Spread, check_scene};
+pub use sc::ScSettings;
+pub use scene::{FingerPulses, PlanSettings, PulseSettings, SceneSettings, SimulateSettings, Spread, check_scene};
 pub use train::TrainSettings;
 
 use crate::error::{Error, Result};

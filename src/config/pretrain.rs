@@ -2,7 +2,7 @@
 
 use super::choices::{FeatureSet, ModelLoss, Structure};
 use super::limits::{network, within_ranges};
-use super::scene::PulseSettings;
+use super::scene::{FingerPulses, PulseSettings};
 use crate::error::Result;
 use crate::nn::Activation;
 use serde::{Deserialize, Serialize};
@@ -28,6 +28,8 @@ pub struct PretrainSettings {
     pub reexecute: u64,
     /// Disturbance pulses of those executions.
     pub reexecute_pulses: PulseSettings,
+    /// Commands of the fingers in those executions.
+    pub reexecute_fingers: FingerPulses,
     /// Epochs E over the demos; the learning rate falls along all of them, but they may end before, as `patience` says.
     pub epochs: u64,
     /// Epochs after which a network is done when they have not brought its loss on the validation demos `min_gain` below the lowest that
@@ -58,6 +60,7 @@ impl Default for PretrainSettings {
             loss: ModelLoss::StandardisedHuber,
             reexecute: 0,
             reexecute_pulses: PulseSettings { probability: 0.01, ..PulseSettings::default() },
+            reexecute_fingers: FingerPulses::default(),
             epochs: 200,
             patience: 10,
             min_gain: 0.02,

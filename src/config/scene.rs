@@ -159,6 +159,25 @@ impl Default for PulseSettings {
     }
 }
 
+/// `[pretrain.reexecute_fingers]`: for a few control steps each finger is given another command than the demo's, so that the dynamics
+/// network sees hands that open and close where no demo does.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct FingerPulses {
+    /// Probability per step that such a pulse begins; 0 turns them off.
+    pub probability: f64,
+    /// Length of a pulse in control steps.
+    pub steps: u32,
+    /// Fastest command \[rad/s\]; each finger's is uniform between it and its opposite.
+    pub speed_rad_s: f64,
+}
+
+impl Default for FingerPulses {
+    fn default() -> Self {
+        FingerPulses { probability: 0.0, steps: 3, speed_rad_s: 0.8 }
+    }
+}
+
 /// `[simulate]`: execution of plans in contact physics.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]

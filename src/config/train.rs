@@ -1,9 +1,9 @@
 //! Settings of the policy. Defaults are the preset `best`; the literal preset of the paper sets the keys that differ.
 
-use super::choices::{ActionChoice, Alpha, Convergence, FeatureSet, FingerCloning, Objective, Pairs, StateScale};
+use super::choices::{ActionChoice, Alpha, Convergence, FeatureSet, Objective};
 use super::limits::{network, within_ranges};
 use super::ppo::PpoSettings;
-use super::scene::PulseSettings;
+use super::sc::ScSettings;
 use crate::error::{Error, Result};
 use crate::nn::Activation;
 use serde::{Deserialize, Serialize};
@@ -43,23 +43,8 @@ pub struct TrainSettings {
     pub alpha_average: bool,
     /// rho: state recovery probability of Algorithm 3.
     pub rho: f64,
-    /// Scale of each state entry in L_SC; without effect under `loss = "raw-sum"`.
-    pub sc_scale: StateScale,
-    /// Whether L_SC leaves out joint velocities. They repeat the action: with them, coming back to the path costs as much as leaving it.
-    pub sc_mask_dq: bool,
-    /// Which commands of the fingers L_SC teaches; L_BC teaches all. Where L_BC has no weight (alpha = 1, `sc`), `"following"` means all.
-    pub sc_fingers: FingerCloning,
-    /// Error, in units of `sc_scale`, beyond which L_SC grows as a line instead of a parabola; 0 = never. Without it the few large
-    /// errors after a push outweigh the millimetres that decide a release.
-    pub sc_knee: f64,
-    /// Whether L_SC is scaled so that its gradient is as long as that of L_BC before alpha mixes the two.
-    pub sc_balance: bool,
-    /// Variance of the Gaussian noise on each action of a rollout in the dynamics network \[(rad/s)^2\].
-    pub sc_noise_variance: f64,
-    /// Disturbance pulses in those rollouts, as `[simulate.pulses]` makes them in the simulator.
-    pub sc_pulses: PulseSettings,
-    /// Which pairs enter the buffer B of Algorithm 3.
-    pub sc_pairs: Pairs,
+    /// L_SC.
+    pub sc: ScSettings,
     /// Whether the dynamics network keeps learning from observed transitions (Eq. 6) during training.
     pub fine_tune_dynamics: bool,
     /// Learning rate of that.
@@ -110,14 +95,7 @@ impl Default for TrainSettings {
             alpha_max: 0.8,
             alpha_average: true,
             rho: 0.3,
-            sc_scale: StateScale::Step,
-            sc_mask_dq: true,
-            sc_fingers: FingerCloning::Following,
-            sc_knee: 0.3,
-            sc_balance: true,
-            sc_noise_variance: 0.001,
-            sc_pulses: PulseSettings { probability: 0.03, ..PulseSettings::default() },
-            sc_pairs: Pairs::BeforeRecovery,
+            sc: ScSettings::default(),
             fine_tune_dynamics: true,
             dynamics_learning_rate: 1e-4,
             warm_start_updates: 15_000,

@@ -5,6 +5,7 @@ use super::state::State;
 use super::step::Step;
 use crate::config::{Pipeline, Stage};
 use crate::learn::MethodName;
+use crate::learn::methods::from_scratch;
 use crate::task::Task;
 use std::collections::BTreeMap;
 use std::fs;
@@ -55,12 +56,12 @@ pub fn cost_s(stage: Stage, pipeline: &Pipeline, method: Option<MethodName>) -> 
 
 /// Updates, counted in those of behavior cloning.
 fn updates(pipeline: &Pipeline, demos: f64, method: Option<MethodName>) -> f64 {
-    let train = &pipeline.train;
+    let from_scratch = from_scratch(&pipeline.train);
+    let train = if method == Some(MethodName::Sc) { &from_scratch } else { &pipeline.train };
     let per_epoch = (demos / train.batch.max(1) as f64).ceil().max(1.0);
     let of_algorithm_1 = train.epochs_of(per_epoch as u64) as f64 * per_epoch;
-    let warm_start = if method == Some(MethodName::Sc) { 0.0 } else { train.warm_start_updates as f64 };
     let each = if method == Some(MethodName::Bc) { 1.0 } else { HIL_UPDATE * train.batch as f64 / HIL_BATCH };
-    warm_start + each * of_algorithm_1
+    train.warm_start_updates as f64 + each * of_algorithm_1
 }
 
 /// The wall time that a log ends with \[s\].

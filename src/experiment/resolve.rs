@@ -16,9 +16,9 @@ use std::path::Path;
 const PIPELINES: &str = "pipelines";
 /// Keys without effect on behavior cloning: what state cloning, the mixture and the dynamics network are set by. A dot or underscore ends a family.
 const NOT_OF_BC: [&str; 7] =
-    ["pretrain.", "train.alpha", "train.rho", "train.sc_", "train.fine_tune_dynamics", "train.dynamics_", "train.ppo."];
+    ["pretrain.", "train.alpha", "train.rho", "train.sc.", "train.fine_tune_dynamics", "train.dynamics_", "train.ppo."];
 /// Keys without effect on state cloning alone.
-const NOT_OF_SC: [&str; 4] = ["train.alpha", "train.warm_start_", "train.bc_batch", "train.ppo."];
+const NOT_OF_SC: [&str; 3] = ["train.alpha", "train.bc_batch", "train.ppo."];
 /// Keys without effect on their hybrid.
 const NOT_OF_HIL: [&str; 1] = ["train.ppo."];
 /// Keys without effect on reinforcement learning, which has its own table beside the network's keys of `[train]`.
@@ -33,7 +33,7 @@ const NOT_OF_PPO: [&str; 21] = [
     "train.tau",
     "train.alpha",
     "train.rho",
-    "train.sc_",
+    "train.sc.",
     "train.fine_tune_dynamics",
     "train.dynamics_",
     "train.warm_start_",

@@ -2,27 +2,56 @@
 
 use super::disturbance::Disturbance;
 use super::episode::{Controller, run_episode};
-use crate::config::{SceneSettings, SimulateSettings};
+use crate::config::{FingerPulses, SceneSettings, SimulateSettings};
 use crate::demo::{Demo, Episode};
 use crate::error::Result;
 use crate::interrupt::Interrupt;
 use crate::scene::Scene;
-use crate::state::{Action, JOINTS, State};
+use crate::seed::stream;
+use crate::state::{ARM_JOINTS, Action, FINGERS, JOINTS, State};
 use crate::tasks::Observation;
+use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 
 /// Plays a demo's commands, then stands still.
 struct Replay<'a> {
     commands: std::slice::ChunksExact<'a, f32>,
+    fingers: Option<Excitation<'a>>,
 }
 
 impl Controller for Replay<'_> {
     fn command(&mut self, _seen: &Observation) -> Action {
-        self.commands.next().map_or([0.0; JOINTS], |command| std::array::from_fn(|i| f64::from(command[i])))
+        let mut command = self.commands.next().map_or([0.0; JOINTS], |c| std::array::from_fn(|i| f64::from(c[i])));
+        if let Some(speeds) = self.fingers.as_mut().and_then(Excitation::advance) {
+            command[ARM_JOINTS..].copy_from_slice(&speeds);
+        }
+        command
     }
 }
 
-/// Runs the commands of `demo` from its start under disturbances drawn from `rng`, for as many steps as the demo has. Friction and
+/// The fingers' own commands, now and then.
+struct Excitation<'a> {
+    settings: &'a FingerPulses,
+    rng: ChaCha8Rng,
+    /// Control steps that a pulse still lasts.
+    left: u32,
+    speeds: [f64; FINGERS],
+}
+
+impl Excitation<'_> {
+    /// The next control step's commands \[rad/s\], unless they are the demo's.
+    fn advance(&mut self) -> Option<[f64; FINGERS]> {
+        self.left = self.left.saturating_sub(1);
+        if self.left == 0 && self.rng.random::<f64>() < self.settings.probability {
+            self.left = self.settings.steps;
+            self.speeds = std::array::from_fn(|_| self.settings.speed_rad_s * (2.0 * self.rng.random::<f64>() - 1.0));
+        }
+        (self.left > 0).then_some(self.speeds)
+    }
+}
+
+/// Runs the commands of `demo` from its start under disturbances drawn from `rng`, for as many steps as the demo has, now and then with
+/// other commands for the `fingers`. Friction and
 /// mass are drawn anew and obstacles taken from the settings: a dataset does not hold them.
 ///
 /// # Errors
@@ -32,6 +61,7 @@ pub fn reexecute(
     demo: &Demo,
     scene: &SceneSettings,
     settings: &SimulateSettings,
+    fingers: &FingerPulses,
     mut rng: ChaCha8Rng,
     interrupt: &Interrupt,
 ) -> Result<Episode> {
@@ -44,7 +74,12 @@ pub fn reexecute(
         friction: scene.friction.draw(&mut rng),
         block_mass_kg: scene.block_mass_kg.draw(&mut rng),
     };
-    let mut replay = Replay { commands: demo.actions().chunks_exact(JOINTS) };
+    let excitation = |rng: &mut ChaCha8Rng| {
+        let rng = stream(rng.random(), "reexecute.fingers", index);
+        Excitation { settings: fingers, rng, left: 0, speeds: [0.0; FINGERS] }
+    };
+    let fingers = (fingers.probability > 0.0).then(|| excitation(&mut rng));
+    let mut replay = Replay { commands: demo.actions().chunks_exact(JOINTS), fingers };
     let steps = u32::try_from(demo.len()).unwrap_or(u32::MAX);
     run_episode(index, &scene, &mut replay, &mut Disturbance::new(settings, rng), steps, interrupt)
 }
@@ -55,7 +90,6 @@ mod tests {
     use crate::config::PulseSettings;
     use crate::math::sin_cos;
     use crate::scene::Obstacle;
-    use crate::seed::stream;
     use crate::sim::World;
     use crate::tasks::{FailureClass, Task, draw_scene};
 
@@ -75,7 +109,8 @@ mod tests {
         let again = |noise_variance: f64| {
             let off = PulseSettings { probability: 0.0, ..PulseSettings::default() };
             let noise = SimulateSettings { noise_variance, pulses: off, ..SimulateSettings::default() };
-            let episode = reexecute(0, &demo, &settings, &noise, stream(4, "noise", 0), &Interrupt::default());
+            let episode =
+                reexecute(0, &demo, &settings, &noise, &FingerPulses::default(), stream(4, "noise", 0), &Interrupt::default());
             let episode = episode.expect("not interrupted");
             let states = episode.to_demo().expect("a demo").states().to_vec();
             states.iter().zip(demo.states()).map(|(a, b)| (a - b).abs()).fold(0.0f32, f32::max)
@@ -93,7 +128,42 @@ mod tests {
         const STEPS: usize = 100;
         let (states, still) = (start.repeat(STEPS + 1), vec![0.0; STEPS * JOINTS]);
         let demo = Demo::new(Task::PickUp, states, still.clone(), still).expect("lengths match");
-        let episode = reexecute(0, &demo, &settings, &SimulateSettings::default(), stream(4, "noise", 0), &Interrupt::default());
+        let episode = reexecute(
+            0,
+            &demo,
+            &settings,
+            &SimulateSettings::default(),
+            &FingerPulses::default(),
+            stream(4, "noise", 0),
+            &Interrupt::default(),
+        );
         assert_eq!(episode.expect("no error").failure, Some(FailureClass::SimulationBrokeDown));
+    }
+
+    #[test]
+    fn excited_fingers_get_other_commands_and_the_arm_the_demos() {
+        let settings = SceneSettings::default();
+        let scene = draw_scene(Task::PickUp, &settings, &mut stream(3, "scene", 0)).expect("there is room");
+        const STEPS: usize = 60;
+        let states = World::new(&scene).observe().state.to_row().repeat(STEPS + 1);
+        let actions: Vec<f32> = (0..STEPS * JOINTS).map(|i| 0.01 * (i % JOINTS) as f32).collect();
+        let demo = Demo::new(Task::PickUp, states, actions.clone(), actions.clone()).expect("lengths match");
+        let executed = |fingers: &FingerPulses, index: u64| -> Vec<f32> {
+            let noise = SimulateSettings { noise_variance: 0.0, ..SimulateSettings::default() };
+            let episode = reexecute(index, &demo, &settings, &noise, fingers, stream(4, "noise", 0), &Interrupt::default());
+            episode.expect("not interrupted").to_demo().expect("a demo").executed().to_vec()
+        };
+        assert_eq!(executed(&FingerPulses::default(), 0), actions);
+        let fingers = FingerPulses { probability: 0.2, ..FingerPulses::default() };
+        let (excited, mut changed) = (executed(&fingers, 0), 0);
+        for (excited, demo) in excited.chunks(JOINTS).zip(actions.chunks(JOINTS)) {
+            assert_eq!(excited[..ARM_JOINTS], demo[..ARM_JOINTS]);
+            assert!(excited[ARM_JOINTS..].iter().all(|speed| speed.abs() <= fingers.speed_rad_s as f32), "{excited:?}");
+            changed += usize::from(excited[ARM_JOINTS..] != demo[ARM_JOINTS..]);
+        }
+        // A pulse of three steps begins in a fifth of the steps outside of one.
+        assert!((STEPS / 8..STEPS * 3 / 4).contains(&changed), "{changed} of {STEPS} steps");
+        assert_eq!(excited, executed(&fingers, 0));
+        assert_ne!(excited, executed(&fingers, 1));
     }
 }

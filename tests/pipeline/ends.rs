@@ -31,7 +31,7 @@ const ENDS: [(&str, &str, &str); 26] = [
     ("train", "train.select_candidates=1000000", ""),
     ("train", "train.tau=1e-6", ""),
     ("train", "train.std_floor=1000", ""),
-    ("train", "train.sc_noise_variance=1", ""),
+    ("train", "train.sc.noise_variance=1", ""),
     ("evaluate", "scene.block_mass_kg=0.001", ""),
     ("evaluate", "scene.friction=10", ""),
 ];

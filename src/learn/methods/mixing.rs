@@ -47,7 +47,7 @@ impl Mixing {
     /// At the beginning of Algorithm 1.
     pub fn new(alpha: Alpha, settings: &TrainSettings, updates_per_epoch: u64) -> Self {
         let keep = if settings.alpha_average { 1.0 - 1.0 / updates_per_epoch.max(1) as f64 } else { 0.0 };
-        Mixing { alpha, cap: settings.alpha_max, keep, averages: Averages::default(), balance: settings.sc_balance }
+        Mixing { alpha, cap: settings.alpha_max, keep, averages: Averages::default(), balance: settings.sc.balance }
     }
 
     /// Whether L_SC can get a weight.
@@ -86,6 +86,7 @@ impl Mixing {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::config::ScSettings;
 
     #[test]
     fn alpha_follows_d_conv_within_its_bounds() {
@@ -101,7 +102,7 @@ mod tests {
 
     #[test]
     fn l_sc_is_scaled_to_the_gradient_of_l_bc() {
-        let settings = TrainSettings { sc_balance: true, ..Default::default() };
+        let settings = TrainSettings { sc: ScSettings { balance: true, ..Default::default() }, ..Default::default() };
         let mut mixing = Mixing::new(Alpha::Adaptive, &settings, 10);
         assert_eq!(mixing.sc_scale(), 1.0);
         mixing.see_norms(0.2, 20.0);

@@ -96,9 +96,16 @@ pub fn imitator(
     let Some(alpha) = method.alpha(settings) else {
         return Err(Error::Usage(format!("{} learns in the simulator, not from demos", method.name())));
     };
-    let from_scratch = TrainSettings { warm_start_updates: 0, ..settings.clone() };
+    let from_scratch = from_scratch(settings);
     let settings = if method == MethodName::Sc { &from_scratch } else { settings };
     Ok(Box::new(Hil::new(inputs, dynamics, alpha, settings, seed)?))
+}
+
+/// State cloning has no warm start, which is behavior cloning; it may use as many updates as that, and its learning rate.
+pub(crate) fn from_scratch(settings: &TrainSettings) -> TrainSettings {
+    let updates = settings.warm_start_updates;
+    let learning_rate = if updates > 0 { settings.warm_start_learning_rate } else { settings.learning_rate };
+    TrainSettings { warm_start_updates: 0, min_updates: settings.min_updates.max(updates), learning_rate, ..settings.clone() }
 }
 
 /// Trains a policy on demos. A run that goes on from a checkpoint of the same run ends with the same bits.

@@ -2,6 +2,7 @@
 
 use super::corpus::Corpus;
 use super::features::Features;
+use super::older;
 use super::scaling::Scaling;
 use super::weights::{Reader, push_features, push_network, push_scaling};
 use crate::config::{PretrainSettings, Structure};
@@ -182,7 +183,7 @@ impl Dynamics {
     pub fn from_tensors(tensors: &[NamedTensor], meta: &Value) -> Result<Self, String> {
         let reader = Reader { tensors, meta };
         let task = reader.task("dynamics")?;
-        let settings = settings_of(&reader)?;
+        let settings: PretrainSettings = reader.settings(older::of_dynamics)?;
         settings.validate().map_err(|why| format!("its settings cannot have trained it: {why}"))?;
         let features = reader.features("dynamics", task)?;
         let net = reader.network("dynamics", features.width() + JOINTS, BASE_DIM)?;
@@ -196,23 +197,6 @@ impl Dynamics {
             settings,
         })
     }
-}
-
-/// Keys that settings of older networks have, with the only value under which this version computes what they did.
-const RETIRED: [(&str, u64); 2] = [("steps", 1), ("ensemble", 1)];
-
-/// The settings that a network was trained with, by this version or an older one.
-fn settings_of(reader: &Reader) -> Result<PretrainSettings, String> {
-    let mut settings: Value = reader.meta("settings")?;
-    for (key, neutral) in RETIRED {
-        match settings.as_object_mut().and_then(|all| all.remove(key)) {
-            Some(value) if value != neutral => {
-                return Err(format!("it was trained with pretrain.{key} = {value}, which hilt no longer has; pretrain it anew"));
-            }
-            _ => {}
-        }
-    }
-    Reader { tensors: reader.tensors, meta: &json!({ "settings": settings }) }.meta("settings")
 }
 
 #[cfg(test)]

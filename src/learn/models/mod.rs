@@ -5,6 +5,7 @@ mod dynamics;
 mod features;
 mod hand;
 mod model_report;
+mod older;
 mod policy;
 mod relations;
 mod samples;

@@ -2,6 +2,7 @@
 
 use super::corpus::Corpus;
 use super::features::Features;
+use super::older;
 use super::scaling::Scaling;
 use super::weights::{Reader, push_features, push_network, push_scaling, vector};
 use crate::config::{MOST_STEPS, TrainSettings};
@@ -160,7 +161,7 @@ impl Policy {
         if !(1..=MOST_HORIZON_STEPS).contains(&horizon_steps) {
             return Err(format!("\"horizon_steps\" of the description is {horizon_steps}; allowed: 1 to {MOST_HORIZON_STEPS}"));
         }
-        let settings: TrainSettings = reader.meta("settings")?;
+        let settings: TrainSettings = reader.settings(older::of_policy)?;
         settings.validate().map_err(|why| format!("its settings cannot have trained it: {why}"))?;
         let features = reader.features("policy", task)?;
         let net = reader.network("policy", features.width(), JOINTS)?;
@@ -234,6 +235,22 @@ mod tests {
             let message = Policy::from_tensors(&tensors, &policy.meta()).expect_err(name);
             assert!(message.contains(said), "{name}: {message}");
         }
+    }
+
+    #[test]
+    fn a_policy_of_an_older_version_is_read() {
+        let corpus = Corpus::new(demos(Task::Stack, 3, 20, 0), "training").expect("demos");
+        let mut settings = TrainSettings::default();
+        (settings.sc.knee, settings.sc.balance) = (0.25, false);
+        let policy = Policy::new(&corpus, &settings, &mut stream(0, "test", 0));
+        let mut meta = policy.meta();
+        let all = meta["settings"].as_object_mut().expect("a table");
+        let sc = all.remove("sc").expect("a table of its own today");
+        all.extend(sc.as_object().expect("a table").iter().map(|(key, value)| (format!("sc_{key}"), value.clone())));
+        assert_eq!(Policy::from_tensors(&policy.to_tensors(), &meta).as_ref(), Ok(&policy));
+        meta["settings"]["sc_kneee"] = json!(1);
+        let message = Policy::from_tensors(&policy.to_tensors(), &meta).expect_err("a key that never was");
+        assert!(message.contains("unknown field `kneee`"), "{message}");
     }
 
     #[test]

@@ -10,7 +10,7 @@ use crate::task::Task;
 use crate::tensor::NamedTensor;
 use crate::words::shown;
 use serde::de::DeserializeOwned;
-use serde_json::Value;
+use serde_json::{Map, Value, json};
 
 /// Size of a logarithm whose exponential single precision holds, with room for what it is multiplied with.
 const LARGEST_LOG_STD: f32 = 40.0;
@@ -59,6 +59,13 @@ impl Reader<'_> {
             let (value, why) = (shown(&value.to_string()), shown(&e.to_string()));
             format!("\"{key}\" of the description is {value}: {why}")
         })
+    }
+
+    /// The settings that the network was trained with; `update` makes this version's of an older one's.
+    pub fn settings<T: DeserializeOwned>(&self, update: fn(&mut Map<String, Value>) -> Result<(), String>) -> Result<T, String> {
+        let mut settings: Value = self.meta("settings")?;
+        settings.as_object_mut().map_or(Ok(()), update)?;
+        Reader { tensors: self.tensors, meta: &json!({ "settings": settings }) }.meta("settings")
     }
 
     /// The kind and task of the network; refuses another kind, and a state size that is not the task's.

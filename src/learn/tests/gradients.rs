@@ -2,8 +2,8 @@
 
 use super::testing::demos;
 use crate::config::{
-    ActionChoice, FeatureSet, FingerCloning, Objective, Pairs, PretrainSettings, PulseSettings, StateScale, Structure,
-    TrainSettings,
+    ActionChoice, FeatureSet, FingerCloning, Objective, Pairs, PretrainSettings, PulseSettings, ScSettings, StateScale,
+    Structure, TrainSettings,
 };
 use crate::learn::losses::shards::add_scaled;
 use crate::learn::losses::state_cloning::{self as sc, Pushes, Segment, draw_segments};
@@ -69,12 +69,12 @@ impl World {
         let mut segments = Vec::new();
         let lengths = [6, 1, 3, 0, 5, 2, 4, 7].map(|d| self.corpus.demo(d).len());
         let mut rng = stream(5, "coins", 0);
-        draw_segments(lengths.into_iter(), self.settings.rho, self.settings.sc_pairs, &mut rng, &mut segments);
+        draw_segments(lengths.into_iter(), self.settings.rho, self.settings.sc.pairs, &mut rng, &mut segments);
         segments
     }
 
     fn pushes(&self) -> Pushes {
-        let mut pushes = Pushes::new(&self.settings, self.rows.len());
+        let mut pushes = Pushes::new(&self.settings.sc, self.rows.len());
         let lengths = [6, 1, 3, 0, 5, 2, 4, 7].map(|d| self.corpus.demo(d).len());
         pushes.draw(lengths.into_iter(), &mut stream(8, "pushes", 0));
         pushes
@@ -175,11 +175,14 @@ fn sc_worlds() -> Vec<(&'static str, World)> {
                     mask_dq: false,
                     action: ActionChoice::Sample,
                     loss: Objective::RawSum,
-                    sc_pairs: Pairs::AfterRecovery,
-                    sc_mask_dq: false,
-                    sc_knee: 0.0,
-                    sc_noise_variance: 0.0,
-                    sc_pulses: PulseSettings::default(),
+                    sc: ScSettings {
+                        pairs: Pairs::AfterRecovery,
+                        mask_dq: false,
+                        knee: 0.0,
+                        noise_variance: 0.0,
+                        pulses: PulseSettings::default(),
+                        ..Default::default()
+                    },
                     ..defaults.clone()
                 }),
             ),
@@ -193,7 +196,7 @@ fn sc_worlds() -> Vec<(&'static str, World)> {
                     features: FeatureSet::Fk,
                     mask_dq: false,
                     activation: Activation::Relu,
-                    sc_scale: StateScale::State,
+                    sc: ScSettings { scale: StateScale::State, ..Default::default() },
                     rho: 0.0,
                     ..defaults
                 }),
@@ -245,12 +248,12 @@ fn step_by_step(world: &World, gradient: &mut [f32]) -> f64 {
             dynamics.write_next(&s, &action, f.output.panel(t), &mut prediction[..BASE_DIM]);
             let target = corpus.next(rows.start + t);
             let coin = coins.random::<f64>() < settings.rho;
-            let counts = !(coin && settings.sc_pairs == Pairs::AfterRecovery);
+            let counts = !(coin && settings.sc.pairs == Pairs::AfterRecovery);
             let mut d_prediction = [Lanes::default(); BASE_DIM];
             for k in (0..BASE_DIM).filter(|_| counts) {
                 let error = prediction[k].0[0] - target[k];
                 let (weight, size) = (choices.weights[k], error.abs() * choices.weights[k].sqrt());
-                let knee = if settings.sc_knee > 0.0 { settings.sc_knee as f32 } else { f32::INFINITY };
+                let knee = if settings.sc.knee > 0.0 { settings.sc.knee as f32 } else { f32::INFINITY };
                 let over = (size - knee).max(0.0); // squared error up to the knee, its tangent from there
                 l_sc += f64::from(scale * (size * size - over * over));
                 d_prediction[k] = first_lane(2.0 * scale * weight.sqrt() * size.min(knee) * error.signum());
@@ -275,8 +278,14 @@ fn step_by_step(world: &World, gradient: &mut [f32]) -> f64 {
             dynamics.net.backward_input(&mut f, t..t + 1);
             let seen = dynamics.features().width();
             for k in 0..JOINTS {
-                let base = if known { d_next[k] * 0.05 + d_next[JOINTS + k] } else { Lanes::default() };
-                let d_action = f.d_input.panel(t)[seen + k] / dynamics.action_scaling().std[k] + base;
+                let straight_through = k >= ARM_JOINTS && settings.sc.fingers == FingerCloning::StraightThrough;
+                let mut d_action = f.d_input.panel(t)[seen + k] / dynamics.action_scaling().std[k];
+                if straight_through {
+                    d_action = Lanes::default();
+                }
+                if known || straight_through {
+                    d_action += d_next[k] * 0.05 + d_next[JOINTS + k];
+                }
                 let d_mean = d_action * policy.action_scaling().std[k];
                 let taught = k < ARM_JOINTS || row(&choices.taught, FINGERS, rows.start + t)[k - ARM_JOINTS] == 1.0;
                 pi.d_output.panel_mut(t)[k] = if taught { d_mean } else { Lanes::default() };
@@ -305,9 +314,15 @@ fn step_by_step(world: &World, gradient: &mut [f32]) -> f64 {
 
 #[test]
 fn batched_segments_equal_algorithm_3_step_by_step() {
-    let masked = small(TrainSettings { sc_fingers: FingerCloning::None, ..Default::default() });
+    let of = |fingers| {
+        let sc = ScSettings { fingers, ..Default::default() };
+        small(TrainSettings { sc, rho: 0.3, ..Default::default() })
+    };
+    let masked = of(FingerCloning::None);
     let masked = ("fingers left out", world(Task::Stack, Structure::Kinematic, masked));
-    for (name, world) in sc_worlds().into_iter().chain([masked]) {
+    let straight = of(FingerCloning::StraightThrough);
+    let straight = ("straight through the fingers", world(Task::Stack, Structure::Plain, straight));
+    for (name, world) in sc_worlds().into_iter().chain([masked, straight]) {
         let (mut batched, mut plain) = (Vec::new(), vec![0.0; world.policy.net.params().len()]);
         let loss = world.sc_loss(&mut batched, &mut [0.0; JOINTS]);
         let expected = step_by_step(&world, &mut plain);

@@ -4,7 +4,7 @@ use crate::config::{ActionChoice, FingerCloning, Objective, Pairs, StateScale, T
 use crate::learn::models::{Corpus, DT_S, STEP_FLOOR, Scaling};
 use crate::state::{ARM_JOINTS, BASE_DIM, FINGERS, JOINTS};
 
-/// Spread of a state entry below which L_SC counts it as constant under `sc_scale = "state"`.
+/// Spread of a state entry below which L_SC counts it as constant under `sc.scale = "state"`.
 const STATE_FLOOR: f32 = 0.01;
 
 /// Share of the commanded motion that a finger may miss and still count as one that follows. Of 77,000 commands above the fingers' dead
@@ -18,7 +18,7 @@ fn taught_fingers(fingers: FingerCloning, corpus: &Corpus, r: usize) -> [f32; FI
         let commanded = DT_S * corpus.executed(r)[i];
         let missed = corpus.next(r)[i] - corpus.state(r)[i] - commanded;
         f32::from(match fingers {
-            FingerCloning::All => true,
+            FingerCloning::All | FingerCloning::StraightThrough => true,
             FingerCloning::Following => missed.abs() <= FOLLOWING * commanded.abs(),
             FingerCloning::None => false,
         })
@@ -31,6 +31,8 @@ pub struct Choices {
     pub weights: [f32; BASE_DIM],
     /// 1 where the gradient reaches a finger's command, else 0: transitions x 3.
     pub taught: Vec<f32>,
+    /// Whether the gradient with respect to a finger's command leaves out what the network makes of it.
+    pub straight_through: bool,
     /// Error of each state entry beyond which the loss is a line.
     pub knees: [f32; BASE_DIM],
     /// Whether L_SC is a sum over a demo instead of a mean.
@@ -47,7 +49,7 @@ impl Choices {
     /// From the settings and the training demos.
     pub fn new(settings: &TrainSettings, corpus: &Corpus) -> Self {
         let dim = corpus.task.state_dim();
-        let std = match (settings.loss, settings.sc_scale) {
+        let std = match (settings.loss, settings.sc.scale) {
             (Objective::RawSum, _) => vec![1.0; BASE_DIM],
             (_, StateScale::State) => {
                 Scaling::fit(corpus.rows(), dim, STATE_FLOOR, |r, row| row.copy_from_slice(corpus.state(r))).std
@@ -62,15 +64,16 @@ impl Choices {
         };
         let velocity = |i: usize| (JOINTS..2 * JOINTS).contains(&i);
         let finger = |i: usize| i < 2 * JOINTS && i % JOINTS >= ARM_JOINTS;
-        let masked = |i: usize| settings.sc_mask_dq && velocity(i) || settings.sc_fingers == FingerCloning::None && finger(i);
+        let masked = |i: usize| settings.sc.mask_dq && velocity(i) || settings.sc.fingers == FingerCloning::None && finger(i);
         let weights: [f32; BASE_DIM] = std::array::from_fn(|i| if masked(i) { 0.0 } else { 1.0 / (std[i] * std[i]) });
-        let knee = if settings.sc_knee > 0.0 { settings.sc_knee as f32 } else { f32::INFINITY };
+        let knee = if settings.sc.knee > 0.0 { settings.sc.knee as f32 } else { f32::INFINITY };
         Choices {
             weights,
             knees: weights.map(|weight| if weight > 0.0 { knee / weight.sqrt() } else { f32::INFINITY }),
-            taught: (0..corpus.rows()).flat_map(|r| taught_fingers(settings.sc_fingers, corpus, r)).collect(),
+            taught: (0..corpus.rows()).flat_map(|r| taught_fingers(settings.sc.fingers, corpus, r)).collect(),
+            straight_through: settings.sc.fingers == FingerCloning::StraightThrough,
             objective: settings.loss,
-            pairs: settings.sc_pairs,
+            pairs: settings.sc.pairs,
             rho: settings.rho,
             action: settings.action,
         }
@@ -88,6 +91,7 @@ impl Choices {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::config::ScSettings;
     use crate::demo::Demo;
     use crate::task::Task;
 
@@ -104,7 +108,10 @@ mod tests {
         let actions = [[0.0; ARM_JOINTS + 1].as_slice(), &[command, 0.0]].concat().repeat(moves.len());
         let demo = Demo::new(task, states.concat(), actions.clone(), actions).expect("lengths match");
         let corpus = Corpus::new(&[demo], "training").expect("a demo");
-        let taught = |sc_fingers| Choices::new(&TrainSettings { sc_fingers, ..Default::default() }, &corpus).taught;
+        let taught = |fingers| {
+            let sc = ScSettings { fingers, ..Default::default() };
+            Choices::new(&TrainSettings { sc, ..Default::default() }, &corpus).taught
+        };
         let of_finger: Vec<f32> = taught(FingerCloning::Following).into_iter().skip(1).step_by(FINGERS).collect();
         assert_eq!(of_finger, [1.0, 1.0, 0.0, 0.0, 0.0, 0.0]);
         assert_eq!(taught(FingerCloning::All), [1.0; 6 * FINGERS]);

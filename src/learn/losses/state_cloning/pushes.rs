@@ -1,6 +1,6 @@
 //! Disturbances of the rollouts of Algorithm 3: the policy is pushed off its path in the dynamics network, and L_SC asks it back.
 
-use crate::config::{PulseSettings, TrainSettings};
+use crate::config::{PulseSettings, ScSettings};
 use crate::pulse::Pulse;
 use crate::seed::normal;
 use crate::state::JOINTS;
@@ -15,9 +15,9 @@ pub struct Pushes {
 
 impl Pushes {
     /// As the settings say, with room for `most_rows` transitions.
-    pub fn new(settings: &TrainSettings, most_rows: usize) -> Self {
-        let sigma_rad_s = settings.sc_noise_variance.sqrt() as f32;
-        Pushes { sigma_rad_s, pulses: settings.sc_pulses.clone(), rows: Vec::with_capacity(most_rows * JOINTS) }
+    pub fn new(settings: &ScSettings, most_rows: usize) -> Self {
+        let sigma_rad_s = settings.noise_variance.sqrt() as f32;
+        Pushes { sigma_rad_s, pulses: settings.pulses.clone(), rows: Vec::with_capacity(most_rows * JOINTS) }
     }
 
     /// Draws the disturbances of demos of these lengths.
@@ -49,7 +49,7 @@ mod tests {
     use crate::seed::stream;
     use crate::state::ARM_JOINTS;
 
-    fn drawn(settings: &TrainSettings, lengths: &[usize]) -> Vec<f32> {
+    fn drawn(settings: &ScSettings, lengths: &[usize]) -> Vec<f32> {
         let mut pushes = Pushes::new(settings, 10);
         pushes.draw(lengths.iter().copied(), &mut stream(1, "pushes", 0));
         pushes.rows
@@ -58,7 +58,7 @@ mod tests {
     #[test]
     fn pulses_last_their_steps_on_the_arm_and_end_with_the_demo() {
         let pulses = PulseSettings { probability: 1.0, steps: 3, sigma_rad_s: 0.2 };
-        let rows = drawn(&TrainSettings { sc_noise_variance: 0.0, sc_pulses: pulses, ..Default::default() }, &[4, 2]);
+        let rows = drawn(&ScSettings { noise_variance: 0.0, pulses, ..Default::default() }, &[4, 2]);
         let row = |t: usize| &rows[t * JOINTS..(t + 1) * JOINTS];
         assert!(row(0) == row(2) && row(2) != row(3) && row(3) != row(4) && row(4) == row(5), "{rows:?}");
         assert!((0..6).all(|t| row(t)[ARM_JOINTS..] == [0.0; JOINTS - ARM_JOINTS]));
@@ -67,12 +67,12 @@ mod tests {
     #[test]
     fn the_noise_has_its_variance_on_all_joints() {
         let off = PulseSettings { probability: 0.0, ..PulseSettings::default() };
-        let settings = TrainSettings { sc_noise_variance: 0.04, sc_pulses: off, ..Default::default() };
+        let settings = ScSettings { noise_variance: 0.04, pulses: off, ..Default::default() };
         let rows = drawn(&settings, &[2000]);
         for joint in 0..JOINTS {
             let variance = rows.chunks(JOINTS).map(|row| row[joint].powi(2)).sum::<f32>() / 2000.0;
             assert!((variance - 0.04).abs() < 0.006, "joint {joint}: {variance}");
         }
-        assert!(drawn(&TrainSettings { sc_noise_variance: 0.0, ..settings }, &[5]).is_empty());
+        assert!(drawn(&ScSettings { noise_variance: 0.0, ..settings }, &[5]).is_empty());
     }
 }

@@ -313,8 +313,15 @@ impl Rollout {
             let (d_given, d_state) = (&self.model.d_input.panel(at)[seen..], self.d_states.panel(p));
             let d_mean = if depth.j == 0 { self.d_first.panel_mut(p) } else { self.policy.d_output.panel_mut(later) };
             for k in 0..JOINTS {
-                let known = if kinematic { d_state[k] * DT_S + d_state[JOINTS + k] } else { Lanes::default() };
-                d_mean[k] = (d_given[k] / dynamics.action_scaling().std[k] + known) * policy.action_scaling().std[k];
+                let straight_through = choices.straight_through && k >= ARM_JOINTS;
+                let known = d_state[k] * DT_S + d_state[JOINTS + k]; // of a joint that integrates its command
+                let learned = d_given[k] / dynamics.action_scaling().std[k];
+                let d_action = match (straight_through, kinematic) {
+                    (true, _) => known,
+                    (false, true) => learned + known,
+                    (false, false) => learned,
+                };
+                d_mean[k] = d_action * policy.action_scaling().std[k];
                 if k >= ARM_JOINTS {
                     d_mean[k] = d_mean[k] * self.taught.panel(p)[k - ARM_JOINTS];
                 }

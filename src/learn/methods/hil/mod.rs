@@ -99,7 +99,7 @@ impl Hil {
             sc: sc::Workspace::new(most_rows),
             segments: Vec::with_capacity(most_rows),
             noise: Vec::with_capacity(most_rows * JOINTS),
-            pushes: Pushes::new(&settings, most_rows),
+            pushes: Pushes::new(&settings.sc, most_rows),
         };
         let per_epoch = per_epoch(corpus, &settings);
         Ok(Hil {
@@ -244,22 +244,28 @@ fn per_epoch(corpus: &Corpus, settings: &TrainSettings) -> u64 {
     corpus.demos().div_ceil(settings.batch.min(corpus.demos())) as u64
 }
 
-/// Commands of fingers that do not follow are left to L_BC; where L_BC has no weight, they stay with L_SC.
+/// Commands of fingers that do not follow are left to L_BC; where L_BC has no weight, L_SC reaches them straight through.
 fn with_a_teacher_for_the_fingers(settings: &TrainSettings, alpha: Alpha) -> TrainSettings {
-    let left_to_bc = settings.sc_fingers == FingerCloning::Following && alpha == Alpha::Fixed(1.0);
-    TrainSettings { sc_fingers: if left_to_bc { FingerCloning::All } else { settings.sc_fingers }, ..settings.clone() }
+    let mut settings = settings.clone();
+    if settings.sc.fingers == FingerCloning::Following && alpha == Alpha::Fixed(1.0) {
+        settings.sc.fingers = FingerCloning::StraightThrough;
+    }
+    settings
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::config::ScSettings;
 
     #[test]
     fn without_l_bc_no_finger_is_left_alone() {
-        let of = |sc_fingers, alpha| {
-            with_a_teacher_for_the_fingers(&TrainSettings { sc_fingers, ..Default::default() }, alpha).sc_fingers
+        let of = |fingers, alpha| {
+            let sc = ScSettings { fingers, ..Default::default() };
+            with_a_teacher_for_the_fingers(&TrainSettings { sc, ..Default::default() }, alpha).sc.fingers
         };
-        assert_eq!(of(FingerCloning::Following, Alpha::Fixed(1.0)), FingerCloning::All);
+        assert_eq!(of(FingerCloning::Following, Alpha::Fixed(1.0)), FingerCloning::StraightThrough);
+        assert_eq!(of(FingerCloning::All, Alpha::Fixed(1.0)), FingerCloning::All);
         assert_eq!(of(FingerCloning::Following, Alpha::Adaptive), FingerCloning::Following);
         assert_eq!(of(FingerCloning::None, Alpha::Fixed(1.0)), FingerCloning::None);
     }
