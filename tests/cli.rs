@@ -148,11 +148,15 @@ fn settings_come_in_the_promised_order() {
 }
 
 #[test]
-fn both_presets_of_all_tasks_resolve_and_a_stage_shows_its_own_sections() {
+fn all_presets_of_all_tasks_resolve_and_a_stage_shows_its_own_sections() {
     for task in ["pick-up", "pick-and-place", "stack"] {
         let paper = settings_of(&["--task", task, "--preset", "paper"]);
         assert!(paper.contains("probability = 0.0"), "the paper has no pulses: {paper}");
         assert_ne!(settings_of(&["--task", task]), paper);
+        let mended = settings_of(&["--task", task, "--preset", "mended"]);
+        assert_ne!(mended, paper);
+        let same = paper.lines().filter(|line| mended.contains(line)).count();
+        assert!(10 * same > 8 * paper.lines().count(), "mended is the paper's preset with few keys changed: {mended}");
         let file = format!("{}/pipelines/{task}.toml", env!("CARGO_MANIFEST_DIR"));
         assert_eq!(settings_of(&["--pipeline", &file]), settings_of(&["--task", task]), "the binary carries another {task}.toml");
     }
@@ -161,6 +165,22 @@ fn both_presets_of_all_tasks_resolve_and_a_stage_shows_its_own_sections() {
     // A change in one stage leaves the others' settings as they are.
     let other = settings_of(&["--task", "stack", "--set", "train.rho=0.25", "--stage", "pretrain"]);
     assert_eq!(other, settings_of(&["--task", "stack", "--stage", "pretrain"]));
+}
+
+#[test]
+fn a_file_that_extends_a_preset_changes_only_its_own_keys() {
+    let dir = tempfile::tempdir().expect("temporary directory");
+    let file = dir.path().join("mine.toml");
+    let name = file.to_str().expect("UTF-8 path");
+    fs::write(&file, "extends = \"paper\"\n[train.sc]\nknee = 0.25\n").expect("written");
+    let mine = settings_of(&["--pipeline", name, "--task", "stack"]);
+    let set = settings_of(&["--task", "stack", "--preset", "paper", "--set", "train.sc.knee=0.25"]);
+    assert_eq!(mine, set);
+    says(&["settings", "--pipeline", name], 2, &["names no task"]);
+    fs::write(&file, "extends = \"papre\"\ntask = \"stack\"\n").expect("written");
+    says(&["settings", "--pipeline", name], 2, &[name, "extends: unknown preset \"papre\"; did you mean paper?"]);
+    fs::write(&file, "extends = 1\ntask = \"stack\"\n").expect("written");
+    says(&["settings", "--pipeline", name], 2, &["extends: 1 is no preset's name in quotes"]);
 }
 
 #[test]
