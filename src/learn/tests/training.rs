@@ -47,7 +47,10 @@ fn pure_cloning_is_the_loop_with_alpha_at_its_ends() {
     let bc = policy(Method::Bc, &quick());
     assert_eq!(policy(Method::Hil, &fixed(0.0, 30)), bc);
     assert_eq!(bytes(&run(Method::Bc, &quick(), None).expect("needs no dynamics").policy), bc);
-    assert_eq!(policy(Method::Hil, &fixed(1.0, 0)), policy(Method::Sc, &quick()));
+    // From scratch, with the warm start's number of updates and learning rate.
+    let rate = quick().warm_start_learning_rate;
+    let from_scratch = TrainSettings { min_updates: 30, learning_rate: rate, ..fixed(1.0, 0) };
+    assert_eq!(policy(Method::Hil, &from_scratch), policy(Method::Sc, &quick()));
     assert_ne!(policy(Method::Hil, &fixed(0.5, 30)), bc);
 }
 
