@@ -1,5 +1,6 @@
 //! Settings of the policy. Defaults are the preset `best`; the literal preset of the paper sets the keys that differ.
 
+use super::bc_rl::BcRlSettings;
 use super::choices::{ActionChoice, Alpha, Convergence, FeatureSet, FingerCloning, Objective, Pairs, StateScale};
 use super::limits::{network, within_ranges};
 use super::ppo::PpoSettings;
@@ -90,6 +91,8 @@ pub struct TrainSettings {
     pub select_candidates: u64,
     /// Reinforcement learning (`hilt train --method ppo`).
     pub ppo: PpoSettings,
+    /// Behavior cloning, then reinforcement learning with L_BC (`hilt train --method bc-rl`).
+    pub bc_rl: BcRlSettings,
 }
 
 impl Default for TrainSettings {
@@ -133,6 +136,7 @@ impl Default for TrainSettings {
             select_episodes: 0,
             select_candidates: 3,
             ppo: PpoSettings::default(),
+            bc_rl: BcRlSettings::default(),
         }
     }
 }
