@@ -1,7 +1,7 @@
 //! One file a method, and what methods share.
 
 mod batches;
-mod bc_rl;
+pub mod bc_rl;
 mod cost;
 pub mod descent;
 pub mod fine_tuning;

@@ -10,6 +10,8 @@
 
 mod demos;
 mod method;
+#[cfg(test)]
+mod tests;
 
 use super::hil::Hil;
 use super::inputs::Inputs;

@@ -5,9 +5,12 @@ use super::objective::{Choices, Work};
 use super::toy::{GAMMA, Regulator, TASK, best_gain, cost};
 use super::*;
 use crate::config::{FeatureSet, PpoSettings, TrainSettings};
+use crate::env::Env;
 use crate::learn::models::Reader;
 use crate::math::exp;
 use crate::nn::Lanes;
+use crate::state::JOINTS;
+use crate::task::Task;
 
 fn settings() -> TrainSettings {
     let ppo = PpoSettings {
