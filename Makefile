@@ -186,6 +186,7 @@ table2 table3:
 figures: $(HILT) ## the runs behind the paper's figures 6, 7 and 8
 	$(call EXPERIMENT,figure6)
 	$(call EXPERIMENT,figure7)
+	$(call EXPERIMENT,figure7-rl)
 	$(call EXPERIMENT,figure8)
 
 # --- the binary ---------------------------------------------------------------------------------------------------------------------

@@ -91,7 +91,7 @@ pub struct TrainSettings {
     pub select_candidates: u64,
     /// Reinforcement learning (`hilt train --method ppo`).
     pub ppo: PpoSettings,
-    /// Behavior cloning, then reinforcement learning with L_BC (`hilt train --method bc-rl`).
+    /// Behavior cloning and reinforcement learning together (`hilt train --method bc-rl`).
     pub bc_rl: BcRlSettings,
 }
 

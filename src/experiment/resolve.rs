@@ -55,7 +55,7 @@ const NOT_OF_PPO: [&str; 22] = [
     "train.bc_rl.",
 ];
 /// Keys without effect on behavior cloning that goes on with reinforcement learning: `[train.bc_rl]` says which of PPO's.
-const NOT_OF_BC_RL: [&str; 9] = [
+const NOT_OF_BC_RL: [&str; 11] = [
     "pretrain.",
     "train.alpha",
     "train.rho",
@@ -65,6 +65,8 @@ const NOT_OF_BC_RL: [&str; 9] = [
     "train.ppo.action_unit",
     "train.ppo.initial_std",
     "train.ppo.horizon_steps",
+    "train.ppo.learning_rate",
+    "train.ppo.final_learning_rate",
 ];
 
 /// What one stage does in a cell of the grid.

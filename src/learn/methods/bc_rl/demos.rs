@@ -1,6 +1,6 @@
 //! L_BC beside another objective.
 
-use crate::config::TrainSettings;
+use crate::config::{ActionChoice, Objective, TrainSettings};
 use crate::error::{Error, Result};
 use crate::learn::losses::behavior_cloning::{Batch, Choices, Workspace};
 use crate::learn::losses::{Acted, behavior_cloning, shards};
@@ -19,10 +19,12 @@ pub struct Demos {
 }
 
 impl Demos {
-    /// As `[train]` has L_BC and its batches.
+    /// In batches as `[train]` has them. L_BC is that of the mean action, in units of the demo actions, whatever `train.loss` and
+    /// `train.action` say: lambda means the same in all presets.
     pub fn new(settings: &TrainSettings) -> Self {
+        let of_mean = TrainSettings { loss: Objective::StandardisedMean, action: ActionChoice::Mean, ..settings.clone() };
         Demos {
-            choices: Choices::new(settings),
+            choices: Choices::new(&of_mean),
             batch: settings.bc_batch,
             acted: Acted::default(),
             work: Workspace::new(settings.bc_batch),
@@ -48,7 +50,7 @@ impl Demos {
         let (l_bc, _) = behavior_cloning(&self.acted, batch, &self.choices, rng, &mut self.work);
         if !l_bc.value.is_finite() {
             let (name, value) = (l_bc.name, l_bc.value);
-            return Err(Error::Failed(format!("{name} is {value}: lower train.ppo.learning_rate or train.bc_rl.lambda")));
+            return Err(Error::Failed(format!("{name} is {value}: lower train.bc_rl.learning_rate or train.bc_rl.lambda")));
         }
         self.gradient.resize(to.len(), 0.0);
         self.acted.gradient(policy, lambda * l_bc, &mut self.gradient);

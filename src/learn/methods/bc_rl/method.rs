@@ -66,7 +66,8 @@ impl Method for BcRl {
     }
 
     fn remedy(&self, tensor: &str) -> (&'static str, &'static str) {
-        self.part().remedy(tensor)
+        let (what, remedy) = self.part().remedy(tensor);
+        (what, if self.by_rewards { "lower train.bc_rl.learning_rate or train.ppo.value_learning_rate" } else { remedy })
     }
 
     fn finish(self: Box<Self>) -> (Policy, Option<Dynamics>) {

@@ -16,7 +16,7 @@ mod tests;
 use super::hil::Hil;
 use super::inputs::Inputs;
 use super::ppo::{Lesson, Ppo};
-use crate::config::{Alpha, BcRlSettings, TrainSettings};
+use crate::config::{Alpha, BcRlSettings, PpoSettings, TrainSettings};
 use crate::env::Env;
 use crate::error::Result;
 use crate::interrupt::Interrupt;
@@ -46,7 +46,9 @@ impl BcRl {
     /// As [`Hil::new`] and [`Ppo::new`].
     pub fn new(inputs: Inputs, settings: &TrainSettings, seed: u64, make: impl Fn(u32) -> Result<Box<dyn Env>>) -> Result<Self> {
         let cloning = Hil::new(inputs, None, Alpha::Fixed(0.0), settings, seed)?;
-        let ppo = Ppo::going_on(cloning.policy().clone(), settings, seed, make)?;
+        let rate = settings.bc_rl.learning_rate;
+        let ppo = PpoSettings { learning_rate: rate, final_learning_rate: rate, ..settings.ppo.clone() };
+        let ppo = Ppo::going_on(cloning.policy().clone(), &TrainSettings { ppo, ..settings.clone() }, seed, make)?;
         Ok(BcRl { settings: settings.bc_rl.clone(), seed, demos: Demos::new(settings), cloning, ppo, by_rewards: false })
     }
 

@@ -1,7 +1,7 @@
 //! L_RL + lambda L_BC on toy demos and a toy world.
 
 use super::*;
-use crate::config::{FeatureSet, PpoSettings};
+use crate::config::FeatureSet;
 use crate::learn::methods::ppo::toy::{GAMMA, Regulator, TASK};
 use crate::learn::models::{Corpus, Policy, Reader};
 use crate::learn::run::{Checkpoint, Hooks, Method, run};
@@ -18,7 +18,7 @@ fn settings() -> TrainSettings {
         epochs: 1,
         min_updates: 0,
         ppo,
-        bc_rl: BcRlSettings { lambda: 0.4, lambda_decay: 0.5, value_iterations: 2, initial_std: 0.3 },
+        bc_rl: BcRlSettings { lambda: 0.4, lambda_decay: 0.5, value_iterations: 2, ..Default::default() },
         ..Default::default()
     }
 }
