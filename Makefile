@@ -8,7 +8,8 @@ PRESET ?= best
 PIPELINE_paper  = pipelines/paper/$(TASK).toml
 PIPELINE_mended = pipelines/mended.toml
 PIPELINE ?= $(or $(PIPELINE_$(PRESET)),pipelines/$(TASK).toml)
-# hil: hybrid imitation learning; bc: behavior cloning; sc: state cloning: all share the demos. ppo: reinforcement learning, which needs none.
+# hil: hybrid imitation learning; bc: behavior cloning; sc: state cloning; bc-rl: behavior cloning, then reinforcement learning with its loss: all
+# share the demos. ppo: reinforcement learning, which needs none.
 # Each has a policy of its own in RUNS/TASK.
 METHOD ?= hil
 # 1: an interrupted training goes on from its checkpoint. Planning and simulation go on by themselves.
@@ -59,7 +60,9 @@ override THREADS    := $(strip $(call typed,THREADS))
 
 TASKS := pick-up pick-and-place stack
 PRESETS := best mended paper
-METHODS := hil bc sc ppo
+METHODS := hil bc sc ppo bc-rl
+# What a method learns from: by its artefact, the last stage before training.
+LEARNS_FROM := $(if $(filter ppo,$(METHOD)),,$(if $(filter bc-rl,$(METHOD)),convert,pretrain))
 EXPERIMENTS := $(patsubst pipelines/experiments/%.toml,%,$(wildcard pipelines/experiments/*.toml))
 
 # Characters that mean something to make or to a shell.
@@ -157,9 +160,9 @@ $(STAMP)/pretrain.toml: $(STAMP)/convert.toml
 	$(HILT) pretrain $(FLAGS) $(call RUN,pretrain) --dataset $(DATASET) --out $(DYNAMICS)
 	@$(MADE) done pretrain
 
-$(STAMP)/train$(OF).toml: $(if $(filter ppo,$(METHOD)),,$(STAMP)/pretrain.toml)
+$(STAMP)/train$(OF).toml: $(LEARNS_FROM:%=$(STAMP)/%.toml)
 	@$(MADE) start train $(SETTINGS)
-	$(HILT) train $(FLAGS) $(call RUN,train$(OF)) --method $(METHOD) $(if $(filter ppo,$(METHOD)),,--dataset $(DATASET) --dynamics $(DYNAMICS)) --out $(POLICY) --checkpoint-every $(CHECKPOINT) $(if $(filter 1,$(RESUME)),--resume)
+	$(HILT) train $(FLAGS) $(call RUN,train$(OF)) --method $(METHOD) $(if $(LEARNS_FROM),--dataset $(DATASET)) $(if $(filter pretrain,$(LEARNS_FROM)),--dynamics $(DYNAMICS)) --out $(POLICY) --checkpoint-every $(CHECKPOINT) $(if $(filter 1,$(RESUME)),--resume)
 	@$(MADE) done train
 
 $(STAMP)/evaluate$(OF).toml: $(STAMP)/train$(OF).toml
@@ -185,6 +188,7 @@ table2 table3:
 figures: $(HILT) ## the runs behind the paper's figures 6, 7 and 8
 	$(call EXPERIMENT,figure6)
 	$(call EXPERIMENT,figure7)
+	$(call EXPERIMENT,figure7-rl)
 	$(call EXPERIMENT,figure8)
 
 # --- the binary ---------------------------------------------------------------------------------------------------------------------
@@ -247,7 +251,7 @@ clean-runs: ## remove what was made for TASK under RUNS; files that make did not
 
 help: ## this list
 	@echo "make TARGET [TASK=pick-up|pick-and-place|stack] [RUNS=DIR] [SEED=N] [THREADS=N] [PRESET=best|paper] [PIPELINE=FILE]"
-	@echo "            [METHOD=hil|bc|sc|ppo] [RESUME=1] [CHECKPOINT=SECONDS] [SET=\"stage.key=value ...\"]"
+	@echo "            [METHOD=hil|bc|sc|ppo|bc-rl] [RESUME=1] [CHECKPOINT=SECONDS] [SET=\"stage.key=value ...\"]"
 	@echo "            experiments: [NAME=$(subst $( ) ,|,$(EXPERIMENTS))] [SEEDS=0-4,9] [EPISODES=N] [JOBS=N]"
 	@awk -F ':.*## ' '/^[a-z0-9 -]+:.*## / { printf "  %-12s %s\n", $$1, $$2 }' $(firstword $(MAKEFILE_LIST))
 	@echo "RUNS is a directory without blanks and special characters. METHOD=bc writes policy-bc.safetensors and evaluation-bc.json beside those of hil."

@@ -53,7 +53,7 @@ stage_before() {
         simulate) echo plan ;;
         convert) echo simulate ;;
         pretrain) echo convert ;;
-        train) [ "$method" = ppo ] || echo pretrain ;;
+        train) case $method in ppo) ;; bc-rl) echo convert ;; *) echo pretrain ;; esac ;;
         evaluate) echo train ;;
     esac
 }
@@ -165,14 +165,14 @@ clean() {
     [ -d "$run" ] || return 0
     cd "$run" || exit
     local of method
-    for method in '' -bc -sc -ppo; do
+    for method in '' -bc -sc -ppo -bc-rl; do
         rm -f "policy$method".{safetensors,checkpoint.safetensors,training.parquet} "evaluation$method".{json,parquet,episodes.parquet}
     done
     rm -f plans.parquet dynamics.{safetensors,parquet,errors.parquet,pretraining.parquet} {pre,}training.parquet episode-00000.png
     rm -rf {plans,recordings}.unfinished/{run-*,.hilt-*}
-    rm -f recordings/episode-*.mcap logs/{plan,simulate,convert,pretrain,train{,-bc,-sc,-ppo},evaluate{,-bc,-sc,-ppo}}.log
+    rm -f recordings/episode-*.mcap logs/{plan,simulate,convert,pretrain,train{,-bc,-sc,-ppo,-bc-rl},evaluate{,-bc,-sc,-ppo,-bc-rl}}.log
     rm -f dataset/{train,validation}/{meta/{info.json,stats.json,tasks.parquet},{data,meta/episodes}/chunk-*/file-*.parquet}
-    rm -f settings/{,.}{plan,simulate,convert,pretrain,train{,-bc,-sc,-ppo},evaluate{,-bc,-sc,-ppo}}.{toml,begun}
+    rm -f settings/{,.}{plan,simulate,convert,pretrain,train{,-bc,-sc,-ppo,-bc-rl},evaluate{,-bc,-sc,-ppo,-bc-rl}}.{toml,begun}
     rm -rf .hilt-* {dataset,recordings,settings}/.hilt-*
     rm -f {.,settings,logs,recordings,{plans,recordings}.unfinished,dataset,dataset/*,dataset/*/{data,meta},dataset/*/{data,meta/episodes}/chunk-*}/{.DS_Store,.directory,Thumbs.db}
     find recordings {plans,recordings}.unfinished dataset settings logs -depth -type d -exec rmdir {} + 2> /dev/null

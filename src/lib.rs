@@ -18,6 +18,7 @@
 //! | Algorithm 3: SC; Eq. 5: L_SC; rho | [`mod@learn::losses::state_cloning`] | rollouts in f_phi, stochastic recovery, gradient through time |
 //! | Algorithm 4 | [`mod@learn::methods::pretrain_dynamics`] | pretraining of f_phi; [`learn::methods::fine_tuning`] goes on with it |
 //! | Eq. 6: L_model | [`learn::losses::model_loss`] | loss of f_phi on observed transitions |
+//! | BC + RL, which the paper compares with | [`learn::methods::bc_rl`] | BC, then L_RL + lambda L_BC |
 //! | PPO, which the paper compares with | [`learn::methods::ppo`] | learns in the simulator from rewards alone |
 //! | N(0, .001) on actions | [`sim`] | noise while demos are recorded and policies evaluated |
 //! | tasks, milestones, success | [`tasks`] | pick-up, pick-and-place, stack: one file each |

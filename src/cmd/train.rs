@@ -5,10 +5,11 @@ use super::places::{Content, beside};
 use super::{Console, Context, Outcome, pretrain};
 use crate::config::{Pipeline, Stage};
 use crate::data::{ContentHash, atomic, table_file, weights};
+use crate::env::Env;
 use crate::error::{Error, Result};
 use crate::eval::{PolicyController, Rollouts};
 use crate::interrupt::Interrupt;
-use crate::learn::{self, Checkpoint, Dynamics, Hooks, Inputs, MethodName, Policy, Ppo, Selection, imitator};
+use crate::learn::{self, BcRl, Checkpoint, Dynamics, Hooks, Inputs, Method, MethodName, Policy, Ppo, Selection, imitator};
 use crate::scene::Scene;
 use crate::sim::{Controller, TaskEnv};
 use crate::task::Task;
@@ -20,13 +21,13 @@ use std::time::Duration;
 /// Kind of the weights that this stage writes.
 pub const KIND: &str = weights::POLICY;
 
-/// Learn the policy: hybrid imitation learning (Algorithm 1), behavior cloning (2) or state cloning (3) from demos, or reinforcement
-/// learning in the simulator (ppo).
+/// Learn the policy: hybrid imitation learning (Algorithm 1), behavior cloning (2) or state cloning (3) from demos, reinforcement
+/// learning in the simulator (ppo), or behavior cloning and then both (bc-rl).
 #[derive(Debug, clap::Args)]
 pub struct Args {
     #[command(flatten)]
     settings: SettingsArgs,
-    /// Method: hil, bc, sc or ppo
+    /// Method: hil, bc, sc, ppo or bc-rl
     #[arg(long, value_name = "METHOD", default_value = "hil")]
     method: MethodName,
     /// State recovery probability, 0 to 1 [default: train.rho]
@@ -38,7 +39,7 @@ pub struct Args {
     /// Directory with the datasets train and validation; ppo needs none [default: runs/<TASK>/dataset]
     #[arg(long, value_name = "DIR")]
     dataset: Option<PathBuf>,
-    /// Weights of the dynamics network; bc and ppo need none [default: runs/<TASK>/dynamics.safetensors]
+    /// Weights of the dynamics network; bc, ppo and bc-rl need none [default: runs/<TASK>/dynamics.safetensors]
     #[arg(long, value_name = "FILE.safetensors")]
     dynamics: Option<PathBuf>,
     /// Weights to write [default: runs/<TASK>/policy.safetensors, of another method than hil policy-<METHOD>.safetensors]
@@ -66,7 +67,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome> {
     let out = path_or(args.out.as_deref(), pipeline.task, &name);
     let metrics = args.metrics.clone().unwrap_or_else(|| beside(&out, "training.parquet"));
     let needs_demos = args.method.needs_demos();
-    let needs_model = args.method.needs_dynamics() || needs_demos && args.dynamics.is_some();
+    let needs_model = args.method.needs_dynamics() || args.method == MethodName::Bc && args.dynamics.is_some();
     let kept = beside(&out, checkpoint::ENDING);
     let read = needs_demos.then_some(dir.as_path()).into_iter().chain(needs_model.then_some(model.as_path()));
     let places = args.settings.places().read_all(read);
@@ -86,9 +87,11 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome> {
     announce(console, args.resume, resume.as_ref(), &kept);
     let mut keeper = Keeper::new(&kept, &provenance, console, resume.as_ref());
     let settings = &pipeline.train;
-    let learner = match demos {
+    let world = |horizon_steps| -> Result<Box<dyn Env>> { Ok(Box::new(TaskEnv::new(&pipeline, horizon_steps, seed))) };
+    let learner: Box<dyn Method> = match demos {
+        None => Box::new(Ppo::new(pipeline.task, settings, seed, world)?),
+        Some(inputs) if args.method == MethodName::BcRl => Box::new(BcRl::new(inputs, settings, seed, world)?),
         Some(inputs) => imitator(args.method, inputs, dynamics, settings, seed)?,
-        None => Box::new(Ppo::new(pipeline.task, settings, seed, |_| Ok(Box::new(TaskEnv::new(&pipeline, seed))))?),
     };
     let mut epochs = Epochs::new(console);
     let hooks = Hooks {

@@ -1,6 +1,7 @@
 //! Settings: one struct per stage, doc, default and unit beside each field; frozen after parsing.
 //! Precedence: defaults < pipeline file < `--set stage.key=value` < flags.
 
+mod bc_rl;
 mod check;
 mod choices;
 mod data;
@@ -14,6 +15,7 @@ mod sc;
 mod scene;
 mod train;
 
+pub use bc_rl::BcRlSettings;
 pub use choices::{
     ActionChoice, Alpha, Convergence, FeatureSet, FingerCloning, ModelLoss, Objective, Pairs, StateScale, Structure,
 };

@@ -147,6 +147,11 @@ pub(super) const RANGES: &[Range] = &[
     within("train.ppo.clip_norm", 0.0, SINGLE),
     above("train.ppo.action_unit", 0.0, 10.0),
     within("train.ppo.initial_std", SCALE[0], SCALE[1]),
+    within("train.bc_rl.lambda", 0.0, SCALE[1]),
+    within("train.bc_rl.lambda_decay", 0.0, 1.0),
+    within("train.bc_rl.value_iterations", 0.0, MOST_EPOCHS),
+    within("train.bc_rl.initial_std", SCALE[0], SCALE[1]),
+    above("train.bc_rl.learning_rate", 0.0, SINGLE),
 ];
 
 impl Range {

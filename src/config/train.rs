@@ -1,5 +1,6 @@
 //! Settings of the policy. Defaults are the preset `best`; the literal preset of the paper sets the keys that differ.
 
+use super::bc_rl::BcRlSettings;
 use super::choices::{ActionChoice, Alpha, Convergence, FeatureSet, Objective};
 use super::limits::{network, within_ranges};
 use super::ppo::PpoSettings;
@@ -75,6 +76,8 @@ pub struct TrainSettings {
     pub select_candidates: u64,
     /// Reinforcement learning (`hilt train --method ppo`).
     pub ppo: PpoSettings,
+    /// Behavior cloning and reinforcement learning together (`hilt train --method bc-rl`).
+    pub bc_rl: BcRlSettings,
 }
 
 impl Default for TrainSettings {
@@ -111,6 +114,7 @@ impl Default for TrainSettings {
             select_episodes: 0,
             select_candidates: 3,
             ppo: PpoSettings::default(),
+            bc_rl: BcRlSettings::default(),
         }
     }
 }

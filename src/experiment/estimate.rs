@@ -47,20 +47,28 @@ pub fn cost_s(stage: Stage, pipeline: &Pipeline, method: Option<MethodName>) -> 
             let part = if pipeline.pretrain.patience > 0 { PRETRAIN_UNTIL_FLAT } else { 1.0 };
             part * pipeline.pretrain.epochs as f64 * demos * PRETRAIN_S
         }
-        Stage::Train if method == Some(MethodName::Ppo) => pipeline.train.ppo.total_steps as f64 * PPO_STEP_S,
-        Stage::Train => updates(pipeline, demos, method) * UPDATE_S,
+        Stage::Train => {
+            let trials = if by_rewards(method) { pipeline.train.ppo.total_steps as f64 } else { 0.0 };
+            let cloned = if method == Some(MethodName::Ppo) { 0.0 } else { updates(pipeline, demos, method) };
+            trials * PPO_STEP_S + cloned * UPDATE_S
+        }
         Stage::Evaluate => pipeline.evaluate.episodes as f64 * EVALUATE_S,
     };
     wall_s * MEASURED_ON
 }
 
-/// Updates, counted in those of behavior cloning.
+fn by_rewards(method: Option<MethodName>) -> bool {
+    matches!(method, Some(MethodName::Ppo | MethodName::BcRl))
+}
+
+/// Updates on demos, counted in those of behavior cloning.
 fn updates(pipeline: &Pipeline, demos: f64, method: Option<MethodName>) -> f64 {
     let from_scratch = from_scratch(&pipeline.train);
     let train = if method == Some(MethodName::Sc) { &from_scratch } else { &pipeline.train };
     let per_epoch = (demos / train.batch.max(1) as f64).ceil().max(1.0);
     let of_algorithm_1 = train.epochs_of(per_epoch as u64) as f64 * per_epoch;
-    let each = if method == Some(MethodName::Bc) { 1.0 } else { HIL_UPDATE * train.batch as f64 / HIL_BATCH };
+    let each =
+        if matches!(method, Some(MethodName::Bc | MethodName::BcRl)) { 1.0 } else { HIL_UPDATE * train.batch as f64 / HIL_BATCH };
     train.warm_start_updates as f64 + each * of_algorithm_1
 }
 

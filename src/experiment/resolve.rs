@@ -15,14 +15,22 @@ use std::path::Path;
 /// Where presets that do not come with hilt are, a directory each.
 const PIPELINES: &str = "pipelines";
 /// Keys without effect on behavior cloning: what state cloning, the mixture and the dynamics network are set by. A dot or underscore ends a family.
-const NOT_OF_BC: [&str; 7] =
-    ["pretrain.", "train.alpha", "train.rho", "train.sc.", "train.fine_tune_dynamics", "train.dynamics_", "train.ppo."];
+const NOT_OF_BC: [&str; 8] = [
+    "pretrain.",
+    "train.alpha",
+    "train.rho",
+    "train.sc.",
+    "train.fine_tune_dynamics",
+    "train.dynamics_",
+    "train.ppo.",
+    "train.bc_rl.",
+];
 /// Keys without effect on state cloning alone.
-const NOT_OF_SC: [&str; 3] = ["train.alpha", "train.bc_batch", "train.ppo."];
+const NOT_OF_SC: [&str; 4] = ["train.alpha", "train.bc_batch", "train.ppo.", "train.bc_rl."];
 /// Keys without effect on their hybrid.
-const NOT_OF_HIL: [&str; 1] = ["train.ppo."];
+const NOT_OF_HIL: [&str; 2] = ["train.ppo.", "train.bc_rl."];
 /// Keys without effect on reinforcement learning, which has its own table beside the network's keys of `[train]`.
-const NOT_OF_PPO: [&str; 21] = [
+const NOT_OF_PPO: [&str; 22] = [
     "plan.",
     "convert.",
     "pretrain.",
@@ -44,6 +52,21 @@ const NOT_OF_PPO: [&str; 21] = [
     "train.learning_rate",
     "train.clip_norm",
     "train.ema_decay",
+    "train.bc_rl.",
+];
+/// Keys without effect on behavior cloning that goes on with reinforcement learning: `[train.bc_rl]` says which of PPO's.
+const NOT_OF_BC_RL: [&str; 11] = [
+    "pretrain.",
+    "train.alpha",
+    "train.rho",
+    "train.sc.",
+    "train.fine_tune_dynamics",
+    "train.dynamics_",
+    "train.ppo.action_unit",
+    "train.ppo.initial_std",
+    "train.ppo.horizon_steps",
+    "train.ppo.learning_rate",
+    "train.ppo.final_learning_rate",
 ];
 
 /// What one stage does in a cell of the grid.
@@ -141,6 +164,7 @@ fn check_variation(variation: &Variation) -> std::result::Result<(), String> {
         MethodName::Bc => all_of(&variation.set, &NOT_OF_BC),
         MethodName::Sc => all_of(&variation.set, &NOT_OF_SC),
         MethodName::Ppo => all_of(&variation.set, &NOT_OF_PPO),
+        MethodName::BcRl => all_of(&variation.set, &NOT_OF_BC_RL),
     };
     match variation.methods.iter().find(|method| without_effect(**method)) {
         Some(method) => {

@@ -35,8 +35,8 @@ struct Running {
 }
 
 impl TaskEnv {
-    /// As `[scene]`, `[simulate]` and `[train.ppo]` have it.
-    pub fn new(pipeline: &Pipeline, seed: u64) -> Self {
+    /// As `[scene]`, `[simulate]` and `[train.ppo]` have it; episodes are cut off after `horizon_steps`.
+    pub fn new(pipeline: &Pipeline, horizon_steps: u32, seed: u64) -> Self {
         let ppo = &pipeline.train.ppo;
         let pulses = PulseSettings { probability: 0.0, ..pipeline.simulate.pulses.clone() };
         TaskEnv {
@@ -45,7 +45,7 @@ impl TaskEnv {
             noise: SimulateSettings { pulses, ..pipeline.simulate.clone() },
             reward: ppo.reward,
             gamma: ppo.gamma,
-            horizon_steps: ppo.horizon_steps,
+            horizon_steps,
             seed,
             running: None,
         }
@@ -122,7 +122,7 @@ mod tests {
     fn env(change: impl Fn(&mut Pipeline)) -> TaskEnv {
         let mut pipeline = Pipeline::defaults(Task::PickUp);
         change(&mut pipeline);
-        TaskEnv::new(&pipeline, 11)
+        TaskEnv::new(&pipeline, pipeline.train.ppo.horizon_steps, 11)
     }
 
     fn begin(env: &mut TaskEnv, episode: u64) -> Vec<f32> {

@@ -1,6 +1,7 @@
 //! How an epoch over the transitions of demos is cut into updates.
 
 use crate::learn::models::Corpus;
+use rand::RngExt;
 use rand::seq::SliceRandom;
 
 /// How an epoch is cut into updates.
@@ -19,6 +20,14 @@ impl<'a> Batches<'a> {
     /// Updates in an epoch; transitions that do not fill a batch wait for the next shuffle.
     pub fn per_epoch(&self) -> u64 {
         self.corpus.rows().checked_div(self.rows).unwrap_or(self.corpus.demos()) as u64
+    }
+
+    /// One batch by itself: transitions may come twice.
+    pub fn draw(&self, rng: &mut impl rand::Rng) -> Vec<usize> {
+        if self.rows == 0 {
+            return self.corpus.demo(rng.random_range(0..self.corpus.demos())).collect();
+        }
+        (0..self.rows).map(|_| rng.random_range(0..self.corpus.rows())).collect()
     }
 
     /// The batches of one epoch, in random order.

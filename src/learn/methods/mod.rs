@@ -1,6 +1,7 @@
 //! One file a method, and what methods share.
 
 mod batches;
+pub mod bc_rl;
 mod cost;
 pub mod descent;
 pub mod fine_tuning;
@@ -13,6 +14,7 @@ pub mod ppo;
 pub mod pretrain_dynamics;
 mod validation;
 
+pub use bc_rl::BcRl;
 pub use hil::{Hil, Update};
 pub use inputs::Inputs;
 pub use ppo::Ppo;
@@ -36,15 +38,17 @@ pub enum MethodName {
     Sc,
     /// Proximal policy optimisation: no demos, but the simulator.
     Ppo,
+    /// Behavior cloning, then proximal policy optimisation with its loss: demos and the simulator.
+    BcRl,
 }
 
 impl MethodName {
     /// All of them.
-    pub const ALL: [MethodName; 4] = [MethodName::Hil, MethodName::Bc, MethodName::Sc, MethodName::Ppo];
+    pub const ALL: [MethodName; 5] = [MethodName::Hil, MethodName::Bc, MethodName::Sc, MethodName::Ppo, MethodName::BcRl];
 
     /// As `hilt train --method` takes it.
     pub fn name(self) -> &'static str {
-        ["hil", "bc", "sc", "ppo"][self as usize]
+        ["hil", "bc", "sc", "ppo", "bc-rl"][self as usize]
     }
 
     /// Whether it learns through a dynamics network.
@@ -63,7 +67,7 @@ impl MethodName {
             MethodName::Hil => Some(settings.alpha),
             MethodName::Bc => Some(Alpha::Fixed(0.0)),
             MethodName::Sc => Some(Alpha::Fixed(1.0)),
-            MethodName::Ppo => None,
+            MethodName::Ppo | MethodName::BcRl => None,
         }
     }
 }
@@ -75,15 +79,18 @@ impl FromStr for MethodName {
         MethodName::ALL.into_iter().find(|method| method.name() == s).ok_or_else(|| {
             let hint = did_you_mean(s, MethodName::ALL.map(MethodName::name));
             let s = shown(s);
-            format!("unknown method \"{s}\"{hint}; allowed: hil (both losses), bc (behavior cloning), sc (state cloning), ppo (from rewards)")
+            format!(
+                "unknown method \"{s}\"{hint}; allowed: hil (both losses), bc (behavior cloning), sc (state cloning), ppo (from rewards), \
+                 bc-rl (behavior cloning, then rewards)"
+            )
         })
     }
 }
 
-/// A method that learns from demos, before its first epoch.
+/// A method that learns from demos alone, before its first epoch.
 ///
 /// # Errors
-/// [`Error::Usage`] for a setting out of range, a missing dynamics network, or a method that learns from no demos; [`Error::Failed`] for a
+/// [`Error::Usage`] for a setting out of range, a missing dynamics network, or a method that needs the simulator; [`Error::Failed`] for a
 /// dynamics network of another task.
 pub fn imitator(
     method: MethodName,
@@ -94,7 +101,7 @@ pub fn imitator(
 ) -> Result<Box<dyn Method>> {
     settings.validate()?;
     let Some(alpha) = method.alpha(settings) else {
-        return Err(Error::Usage(format!("{} learns in the simulator, not from demos", method.name())));
+        return Err(Error::Usage(format!("{} learns in the simulator, not from demos alone", method.name())));
     };
     let from_scratch = from_scratch(settings);
     let settings = if method == MethodName::Sc { &from_scratch } else { settings };

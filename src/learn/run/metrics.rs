@@ -73,7 +73,7 @@ pub fn table(epochs: &[EpochMetrics], metrics: &[Metric]) -> Table {
     let integers = |pick: fn(&EpochMetrics) -> u64| Values::I64(epochs.iter().map(|m| pick(m) as i64).collect());
     let stages = Values::Text(epochs.iter().map(|m| m.stage.clone()).collect());
     let mut table = Table::default()
-        .with("stage", "pretrain (Algorithm 4), warm-start (behavior cloning alone), hil (Algorithm 1) or ppo", stages)
+        .with("stage", "pretrain (Algorithm 4), warm-start (behavior cloning alone), hil (Algorithm 1), ppo or bc-rl", stages)
         .with("epoch", "Epoch of the stage, from 1", integers(|m| m.epoch))
         .with("updates", "Updates of the stage so far", integers(|m| m.updates));
     for Metric { name, doc, .. } in metrics {

@@ -5,6 +5,8 @@ mod method;
 mod metrics;
 mod warm_start;
 
+pub use metrics::METRICS;
+
 use super::descent::Descent;
 use super::fine_tuning::FineTuning;
 use super::inputs::Inputs;
@@ -221,6 +223,16 @@ impl Hil {
             }
             false => Err(Error::Failed(format!("{term} is {value} after {updates} updates of the stage: {remedy}"))),
         }
+    }
+
+    /// The policy as it stands.
+    pub(super) fn policy(&self) -> &Policy {
+        &self.descent.policy
+    }
+
+    /// What it learns from.
+    pub(super) fn demos(&self) -> &Corpus {
+        &self.inputs.train
     }
 
     /// The policy, to be spoilt.

@@ -1,7 +1,7 @@
 //! Iterations as the epochs of a method.
 
-use super::Ppo;
 use super::metrics::METRICS;
+use super::{Lesson, Ppo};
 use crate::error::Result;
 use crate::interrupt::Interrupt;
 use crate::learn::models::{Dynamics, Policy, Reader};
@@ -10,6 +10,20 @@ use serde_json::Value;
 
 /// The only stage.
 const PPO: &str = "ppo";
+
+impl Ppo {
+    /// An iteration, reported as an epoch.
+    ///
+    /// # Errors
+    /// As [`Ppo::iteration`]; [`crate::error::Error::Interrupted`].
+    pub fn report(&mut self, stage: Stage, epoch: u64, interrupt: &Interrupt, lesson: &mut Lesson) -> Result<EpochMetrics> {
+        let numbers = self.iteration(&|| interrupt.check(), lesson)?;
+        let mut row = EpochMetrics::new(stage.name, epoch + 1, stage.epochs);
+        METRICS.iter().zip(numbers).for_each(|(metric, value)| row.set(metric.name, value));
+        row.updates = self.updates;
+        Ok(row)
+    }
+}
 
 impl Method for Ppo {
     fn stages(&self) -> Vec<Stage> {
@@ -23,11 +37,7 @@ impl Method for Ppo {
     fn begin(&mut self, _stage: &str) {}
 
     fn epoch(&mut self, stage: Stage, epoch: u64, interrupt: &Interrupt) -> Result<EpochMetrics> {
-        let numbers = self.iteration(&|| interrupt.check())?;
-        let mut row = EpochMetrics::new(stage.name, epoch + 1, stage.epochs);
-        METRICS.iter().zip(numbers).for_each(|(metric, value)| row.set(metric.name, value));
-        row.updates = self.updates;
-        Ok(row)
+        self.report(stage, epoch, interrupt, &mut Lesson::Both(None))
     }
 
     fn end(&mut self, _stage: &str) {}

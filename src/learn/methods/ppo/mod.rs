@@ -11,6 +11,7 @@
 //! and sums are taken in one order. A world comes back by its actions since the last reset ([`Ppo::restore`]).
 
 mod advantage;
+mod beginning;
 mod episodes;
 mod group;
 mod method;
@@ -21,33 +22,37 @@ mod statistics;
 #[cfg(test)]
 mod tests;
 #[cfg(test)]
-mod toy;
+pub(in crate::learn::methods) mod toy;
 
-use crate::config::{PpoSettings, TrainSettings};
-use crate::env::Env;
+pub use metrics::METRICS;
+
+use crate::config::PpoSettings;
 use crate::error::{Error, Result};
-use crate::learn::limits::affordable;
-use crate::learn::models::{Policy, Scaling};
+use crate::learn::models::Policy;
 use crate::math::ln;
 use crate::nn::{Adam, LANES, Mlp, clip_by_global_norm, cosine, gaussian};
-use crate::robot::VELOCITY_LIMITS_RAD_S;
 use crate::seed::stream;
-use crate::state::JOINTS;
-use crate::task::Task;
 use advantage::{Credit, normalise};
-use episodes::Episodes;
 use group::{Actors, Group, Record};
 use metrics::{Row, Tally};
 use objective::{Choices, Seen, Work};
 use rand::seq::SliceRandom;
 use rayon::prelude::*;
-use statistics::{Sight, Statistics};
-
-/// The last layer of the policy starts this small: the first actions are noise around standing still.
-const FIRST_ACTIONS: f32 = 0.01;
+use statistics::{Sight, Statistics, Sums};
 
 /// Stops a run from within an iteration, by returning an error.
 pub type Check<'a> = &'a (dyn Fn() -> Result<()> + Sync);
+
+/// Adds a gradient of its own to one of the policy's network.
+pub type Further<'a> = &'a mut dyn FnMut(&Policy, &mut [f32]) -> Result<()>;
+
+/// What an iteration is to improve.
+pub enum Lesson<'a> {
+    /// The value network alone.
+    Value,
+    /// Both networks, the policy also by what is given beside the clipped objective.
+    Both(Option<Further<'a>>),
+}
 
 /// Learning by proximal policy optimisation, between two iterations.
 pub struct Ppo {
@@ -55,7 +60,8 @@ pub struct Ppo {
     std_floor: f64,
     seed: u64,
     sight: Sight,
-    statistics: Statistics,
+    /// What the policy's inputs are scaled by; `None` = its scalings stay.
+    statistics: Option<Statistics>,
     policy: Policy,
     value: Mlp,
     policy_adam: Adam,
@@ -71,47 +77,6 @@ pub struct Ppo {
 }
 
 impl Ppo {
-    /// Networks, and worlds at the beginning of their first episodes; `make` gives world 0, 1, ... of `train.ppo.worlds`.
-    ///
-    /// # Errors
-    /// [`Error::Usage`] for settings out of range, [`Error::Failed`] when a world is of another task; what a first episode returns.
-    pub fn new(task: Task, settings: &TrainSettings, seed: u64, make: impl Fn(usize) -> Result<Box<dyn Env>>) -> Result<Self> {
-        settings.validate()?;
-        let ppo = settings.ppo.clone();
-        affordable(ppo.minibatch, settings.hidden_layers, settings.hidden_units, "train.ppo.minibatch or train.hidden_units")?;
-        let sight = Sight { task, set: settings.features, mask_dq: settings.mask_dq };
-        let unit = VELOCITY_LIMITS_RAD_S.map(|limit| (ppo.action_unit * limit) as f32);
-        let action = Scaling { mean: vec![0.0; JOINTS], std: unit.to_vec() };
-        let statistics = Statistics::new(sight);
-        let mut rng = stream(seed, "train.ppo.init", 0);
-        let mut policy = Policy::with_scalings(statistics.features(sight), action, ppo.horizon_steps, settings, &mut rng);
-        policy.log_std.fill(ln(ppo.initial_std.max(settings.std_floor)) as f32);
-        let (weights, biases) = policy.net.layer_ranges(policy.net.layers() - 1);
-        policy.net.params_mut()[weights.start..biases.end].iter_mut().for_each(|w| *w *= FIRST_ACTIONS);
-        let mut widths = policy.net.widths().to_vec();
-        widths[settings.hidden_layers + 1] = 1;
-        let value = Mlp::new(&widths, settings.activation, &mut rng);
-        let mut learning = Ppo {
-            records: (0..ppo.worlds / LANES).map(|_| Record::default()).collect(),
-            groups: worlds_in_groups(task, &ppo, make)?,
-            policy_adam: Adam::new(policy.net.params().len()),
-            std_adam: Adam::new(JOINTS),
-            value_adam: Adam::new(value.params().len()),
-            std_floor: settings.std_floor,
-            settings: ppo,
-            seed,
-            sight,
-            statistics,
-            policy,
-            value,
-            iteration: 0,
-            updates: 0,
-            work: Work::default(),
-        };
-        learning.see_first();
-        Ok(learning)
-    }
-
     /// Control steps of all worlds so far.
     pub fn steps(&self) -> u64 {
         self.iteration * self.settings.batch()
@@ -120,8 +85,8 @@ impl Ppo {
     /// One iteration; what it has seen, in the order of `metrics::METRICS`.
     ///
     /// # Errors
-    /// What `check` returns, [`Error::Failed`] when a number is none any more. The state is of no use then.
-    pub fn iteration(&mut self, check: Check) -> Result<Row> {
+    /// What `check` and the lesson return, [`Error::Failed`] when a number is none any more. The state is of no use then.
+    pub fn iteration(&mut self, check: Check, lesson: &mut Lesson) -> Result<Row> {
         self.act(check)?;
         normalise(self.records.iter_mut().map(|record| &mut record.advantages));
         let mut tally = Tally::new(&self.records);
@@ -133,7 +98,7 @@ impl Ppo {
         );
         for epoch in 0..self.settings.epochs {
             check()?;
-            if !self.pass_over(epoch, rate, &mut tally)? {
+            if !self.pass_over(epoch, rate, lesson, &mut tally)? {
                 break;
             }
         }
@@ -152,14 +117,14 @@ impl Ppo {
             iteration: self.iteration,
             steps: self.settings.steps,
         };
-        self.records.iter_mut().for_each(|record| record.sums = self.statistics.sums());
+        self.records.iter_mut().for_each(|record| record.sums = sums_for(&self.statistics));
         let groups = self.groups.par_iter_mut().zip(&mut self.records).with_max_len(1);
         let acted: Vec<Result<()>> = groups.map(|(group, record)| group.act(&actors, check, record)).collect();
         acted.into_iter().collect()
     }
 
     /// Updates on all steps of the iteration, shuffled; whether there may be another pass.
-    fn pass_over(&mut self, epoch: u64, rate: f64, tally: &mut Tally) -> Result<bool> {
+    fn pass_over(&mut self, epoch: u64, rate: f64, lesson: &mut Lesson, tally: &mut Tally) -> Result<bool> {
         let mut panels: Vec<(usize, usize)> =
             (0..self.groups.len()).flat_map(|g| (0..self.settings.steps).map(move |t| (g, t))).collect();
         let pass = self.iteration * self.settings.epochs + epoch;
@@ -172,19 +137,24 @@ impl Ppo {
             if self.settings.target_kl > 0.0 && seen.kl > self.settings.target_kl {
                 return Ok(false);
             }
-            self.update(rate);
+            self.update(rate, lesson)?;
         }
         Ok(true)
     }
 
-    fn update(&mut self, rate: f64) {
+    fn update(&mut self, rate: f64, lesson: &mut Lesson) -> Result<()> {
         let (work, limit) = (&mut self.work, self.settings.clip_norm);
-        clip_by_global_norm(&mut work.d_policy, limit);
         clip_by_global_norm(&mut work.d_value, limit);
+        self.value_adam.step(&mut self.value.params_mut(), &work.d_value, self.settings.value_learning_rate);
+        let Lesson::Both(further) = lesson else { return Ok(()) };
+        if let Some(further) = further {
+            further(&self.policy, &mut work.d_policy)?;
+        }
+        clip_by_global_norm(&mut work.d_policy, limit);
         self.policy_adam.step(&mut self.policy.net.params_mut(), &work.d_policy, rate);
         self.std_adam.step(&mut self.policy.log_std, &work.d_log_std, rate);
         gaussian::floor_log_std(&mut self.policy.log_std, ln(self.std_floor) as f32);
-        self.value_adam.step(&mut self.value.params_mut(), &work.d_value, self.settings.value_learning_rate);
+        Ok(())
     }
 
     fn check_numbers(&self, seen: &Seen) -> Result<()> {
@@ -201,35 +171,15 @@ impl Ppo {
         Err(Error::Failed(format!("{what} or its gradient is no finite number in iteration {iteration}: lower {remedy}")))
     }
 
-    /// The first observations of all worlds are the first statistics.
-    fn see_first(&mut self) {
-        for (group, record) in self.groups.iter_mut().zip(&mut self.records) {
-            record.sums = self.statistics.sums();
-            group.first_sight(&self.policy, record);
-        }
-        self.take_in();
-    }
-
     /// What the worlds have shown becomes the scalings of the policy's inputs.
     fn take_in(&mut self) {
-        self.records.iter().for_each(|record| self.statistics.absorb(&record.sums));
-        self.policy.set_features(self.statistics.features(self.sight));
+        let Some(statistics) = &mut self.statistics else { return };
+        self.records.iter().for_each(|record| statistics.absorb(&record.sums));
+        self.policy.set_features(statistics.features(self.sight));
     }
 }
 
-fn worlds_in_groups(task: Task, settings: &PpoSettings, make: impl Fn(usize) -> Result<Box<dyn Env>>) -> Result<Vec<Group>> {
-    let count = settings.worlds as u64;
-    let world = |place: usize| {
-        let env = make(place)?;
-        let (seen, asked) = (env.observation_len(), env.action_len());
-        if (seen, asked) != (task.state_dim(), JOINTS) {
-            return Err(Error::Failed(format!(
-                "a world shows {seen} numbers and takes {asked}, but a policy of {task} sees {} and gives {JOINTS}",
-                task.state_dim()
-            )));
-        }
-        Episodes::new(env, place as u64, count)
-    };
-    let groups = (0..settings.worlds).step_by(LANES);
-    groups.map(|first| Ok(Group::new((first..first + LANES).map(world).collect::<Result<_>>()?))).collect()
+/// What a record is to fill for the statistics, if there are any.
+fn sums_for(statistics: &Option<Statistics>) -> Sums {
+    statistics.as_ref().map(Statistics::sums).unwrap_or_default()
 }

@@ -70,8 +70,8 @@ impl Ppo {
 
     fn restore_numbers(&mut self, reader: &Reader) -> Result<(), String> {
         let [policy, std, value]: [u32; 3] = reader.meta("adam_steps")?;
-        let statistics: Statistics = reader.meta("statistics")?;
-        if !statistics.fit(self.sight) {
+        let statistics: Option<Statistics> = reader.meta("statistics")?;
+        if statistics.is_some() != self.statistics.is_some() || statistics.iter().any(|s| !s.fit(self.sight)) {
             return Err("its statistics are not those of this task's features".into());
         }
         (self.iteration, self.updates) = (reader.meta("iteration")?, reader.meta("updates")?);
@@ -83,7 +83,7 @@ impl Ppo {
         let len = self.value.params().len();
         self.value.params_mut().copy_from_slice(&reader.tensor(VALUE, &[len])?);
         self.value_adam = read_adam(reader, VALUE, len, value)?;
-        self.policy.set_features(statistics.features(self.sight));
+        statistics.iter().for_each(|known| self.policy.set_features(known.features(self.sight)));
         self.statistics = statistics;
         Ok(())
     }
@@ -94,7 +94,7 @@ impl Ppo {
         if places.len() != self.settings.worlds {
             return Err(format!("it has {} worlds, this run {}", places.len(), self.settings.worlds));
         }
-        let most = self.settings.horizon_steps as usize;
+        let most = self.policy.horizon_steps() as usize;
         if let Some(wrong) = places.iter().find(|p| p.begun == 0 || p.steps > most) {
             return Err(format!("a world stands in step {} of episode {}; episodes have {most} steps", wrong.steps, wrong.begun));
         }

@@ -5,9 +5,12 @@ use super::objective::{Choices, Work};
 use super::toy::{GAMMA, Regulator, TASK, best_gain, cost};
 use super::*;
 use crate::config::{FeatureSet, PpoSettings, TrainSettings};
+use crate::env::Env;
 use crate::learn::models::Reader;
 use crate::math::exp;
 use crate::nn::Lanes;
+use crate::state::JOINTS;
+use crate::task::Task;
 
 fn settings() -> TrainSettings {
     let ppo = PpoSettings {
@@ -33,7 +36,7 @@ fn it_finds_the_known_optimum_of_a_regulator() {
     let settings = settings();
     let mut ppo = toy(&settings);
     while ppo.iteration < settings.ppo.iterations() {
-        ppo.iteration(&|| Ok(())).expect("an iteration");
+        ppo.iteration(&|| Ok(()), &mut Lesson::Both(None)).expect("an iteration");
     }
     let gain = best_gain() as f32;
     let best = cost(|seen| [-gain * seen[0], -gain * seen[1]]);
@@ -56,7 +59,7 @@ fn left_by(ppo: &Ppo, metrics: &[Row]) -> String {
 }
 
 fn go_on(ppo: &mut Ppo, iterations: u64) -> Vec<Row> {
-    (0..iterations).map(|_| ppo.iteration(&|| Ok(())).expect("an iteration")).collect()
+    (0..iterations).map(|_| ppo.iteration(&|| Ok(()), &mut Lesson::Both(None)).expect("an iteration")).collect()
 }
 
 #[test]
@@ -111,7 +114,7 @@ fn worlds_of_another_task_and_settings_out_of_range_are_refused() {
     let mut odd = settings();
     odd.ppo.worlds = 20;
     assert!(refused(TASK, &odd).contains("multiple of 8"));
-    let stopped = toy(&settings()).iteration(&|| Err(Error::Interrupted));
+    let stopped = toy(&settings()).iteration(&|| Err(Error::Interrupted), &mut Lesson::Both(None));
     assert!(matches!(stopped, Err(Error::Interrupted)));
 }
 
