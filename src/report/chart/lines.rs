@@ -1,0 +1,306 @@
+//! Line charts: values over an axis with intervals and single observations, in panels side by side.
+
+use super::picture::{Picture, color, escaped, legend, marker, stroke, text, width_of};
+use super::scale::{Axis, Scale};
+use std::fmt::Write;
+
+/// A figure of panels that share their axes, title and legend.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Chart {
+    /// Name of its file without ending.
+    pub id: String,
+    /// Above everything.
+    pub title: String,
+    /// The same for who cannot see it.
+    pub description: String,
+    /// Under each panel.
+    pub x_label: String,
+    /// Left of the first panel.
+    pub y_label: String,
+    /// What lines, bars and dots mean.
+    pub note: String,
+    /// What the horizontal axis counts.
+    pub x: Axis,
+    /// Whether values are written as percentages.
+    pub percent: bool,
+    /// From the left, three in a row.
+    pub panels: Vec<Panel>,
+}
+
+/// One pair of axes; the y axis ends at 1 and begins below the lowest value of all panels, so that they compare at sight.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Panel {
+    /// Above the axes.
+    pub title: String,
+    /// The same look is the same thing in every panel.
+    pub series: Vec<Series>,
+}
+
+/// One line.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Series {
+    /// In the legend and at the line's end.
+    pub name: String,
+    /// Its colour, marker and dash, below [`super::LOOKS`].
+    pub look: usize,
+    /// From the left.
+    pub points: Vec<Point>,
+    /// Many points: intervals are a band, and a few points have markers.
+    pub dense: bool,
+}
+
+/// One value, a share between 0 and 1.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Point {
+    /// Its place on the horizontal axis.
+    pub x: f64,
+    /// The value.
+    pub value: f64,
+    /// Its interval, low and high.
+    pub interval: [f64; 2],
+    /// The observations that the value pools.
+    pub singles: Vec<f64>,
+}
+
+// Sizes in pixels.
+const PLOT_WIDTH: f64 = 280.0;
+const PLOT_HEIGHT: f64 = 260.0;
+const LEFT: f64 = 68.0;
+const RIGHT: f64 = 12.0;
+const TOP: f64 = 92.0;
+const BOTTOM: f64 = 40.0;
+/// Between two rows of panels, for ticks, label and title.
+const BETWEEN: f64 = 82.0;
+/// Under the last row, for ticks and label.
+const UNDER: f64 = 38.0;
+/// Right of each panel, beside the names at the ends of its lines.
+const GAP: f64 = 44.0;
+/// Names at the ends of lines stand this far apart at least.
+const LINE: f64 = 14.0;
+/// Series stand this far apart at the same category, so that their intervals can be told apart; more would make lines cross that do not.
+const DODGE: f64 = 4.0;
+/// Single observations stand this far right of their value.
+const SINGLES_RIGHT: f64 = 5.0;
+/// Markers of a dense line.
+const FEW_MARKERS: usize = 6;
+/// Panels in a row.
+const COLUMNS: usize = 3;
+
+/// Steps of the y axis, the finest first; the first with at most [`MOST_TICKS`] steps is taken.
+const Y_STEPS: [f64; 5] = [0.01, 0.02, 0.05, 0.1, 0.2];
+const MOST_TICKS: f64 = 6.0;
+
+impl Chart {
+    /// The picture. Each value is one element of class `mean` with its interval of class `interval`, each observation one of class `single`;
+    /// of a dense line only some values are, and the interval is a `band`.
+    pub fn draw(&self) -> Picture {
+        let columns = self.panels.len().clamp(1, COLUMNS);
+        let rows = self.panels.len().div_ceil(COLUMNS).max(1);
+        let gap = self.gap();
+        let width = LEFT + columns as f64 * (PLOT_WIDTH + gap) + RIGHT;
+        let height = TOP + rows as f64 * (PLOT_HEIGHT + BETWEEN) - BETWEEN + UNDER + BOTTOM;
+        let mut svg = text(LEFT, 26.0, "start", "chart-title", &self.title);
+        svg += &legend(&self.names(), LEFT, 50.0);
+        let scale = Scale::over(&self.x, self.panels.iter().flat_map(|p| &p.series).flat_map(|s| &s.points).map(|p| p.x));
+        for (i, panel) in self.panels.iter().enumerate() {
+            let left = LEFT + (i % COLUMNS) as f64 * (PLOT_WIDTH + gap);
+            let top = TOP + (i / COLUMNS) as f64 * (PLOT_HEIGHT + BETWEEN);
+            svg += &self.axes(panel, &scale, left, top);
+            if i % COLUMNS == 0 {
+                let (middle, label) = (top + PLOT_HEIGHT / 2.0, escaped(&self.y_label));
+                svg += &format!("<text transform=\"translate(18 {middle}) rotate(-90)\" text-anchor=\"middle\">{label}</text>\n");
+            }
+        }
+        svg += &text(LEFT, height - 14.0, "start", "chart-small", &self.note);
+        let Chart { id, title, description, .. } = self.clone();
+        Picture { id, title, description, size: [width, height], body: svg }
+    }
+
+    /// Right of each panel.
+    fn gap(&self) -> f64 {
+        let ends = self.panels.iter().filter(|p| p.series.len() > 1).flat_map(|p| &p.series).map(|s| width_of(&s.name));
+        GAP + ends.fold(0.0, f64::max)
+    }
+
+    /// Names of the looks, in the order of their first panel.
+    fn names(&self) -> Vec<(usize, &str)> {
+        let mut names: Vec<(usize, &str)> = Vec::new();
+        for series in self.panels.iter().flat_map(|panel| &panel.series) {
+            if !names.iter().any(|(look, name)| (*look, *name) == (series.look, series.name.as_str())) {
+                names.push((series.look, &series.name));
+            }
+        }
+        names
+    }
+
+    /// One panel with its upper left corner there.
+    fn axes(&self, panel: &Panel, scale: &Scale, left: f64, top: f64) -> String {
+        let (low, step) = y_axis(&self.panels);
+        let y = |value: f64| top + PLOT_HEIGHT * (1.0 - value) / (1.0 - low);
+        let x = |value: f64| left + PLOT_WIDTH * scale.share(value);
+        let (bottom, right) = (top + PLOT_HEIGHT, left + PLOT_WIDTH);
+        let mut svg = text(left + PLOT_WIDTH / 2.0, top - 10.0, "middle", "", &panel.title);
+        for tick in 0..=((1.0 - low) / step).round() as u32 {
+            let value = low + f64::from(tick) * step;
+            let at = y(value);
+            let _ = writeln!(svg, "<path class=\"chart-grid\" d=\"M{left:.1} {at:.1}H{right:.1}\"/>");
+            let name = if self.percent { format!("{:.0} %", 100.0 * value) } else { format!("{value:.2}") };
+            svg += &text(left - 8.0, at + 4.0, "end", "chart-small", &name);
+        }
+        let _ = writeln!(svg, "<path class=\"chart-axis\" d=\"M{left:.1} {top:.1}V{bottom:.1}H{right:.1}\"/>");
+        for (value, name) in &scale.ticks {
+            svg += &text(x(*value), bottom + 18.0, "middle", "chart-small", name);
+        }
+        svg += &text(left + PLOT_WIDTH / 2.0, bottom + 38.0, "middle", "", &self.x_label);
+        let dodge = if matches!(self.x, Axis::Categories(_)) { DODGE } else { 0.0 };
+        for (i, series) in panel.series.iter().enumerate() {
+            let shift = dodge * (i as f64 - (panel.series.len() as f64 - 1.0) / 2.0);
+            svg += &line(series, scale, |value| x(value) + shift, y);
+        }
+        if panel.series.len() > 1 {
+            svg += &ends(panel, right + 6.0, y);
+        }
+        svg
+    }
+}
+
+/// One series in one panel.
+fn line(series: &Series, scale: &Scale, x: impl Fn(f64) -> f64, y: impl Fn(f64) -> f64) -> String {
+    let points: Vec<&Point> = series.points.iter().filter(|p| scale.holds(p.x) && p.value.is_finite()).collect();
+    let way = |ends: &mut dyn Iterator<Item = (f64, f64)>| {
+        let ends: Vec<String> = ends.map(|(x, y)| format!("{x:.1} {y:.1}")).collect();
+        ends.join("L")
+    };
+    let mut svg = String::new();
+    if points.is_empty() {
+        return svg;
+    }
+    let (color, stroke) = (color(series.look), stroke(series.look));
+    if series.dense {
+        let upper = points.iter().map(|p| (x(p.x), y(p.interval[1])));
+        let lower = points.iter().rev().map(|p| (x(p.x), y(p.interval[0])));
+        let around = way(&mut upper.chain(lower));
+        let _ = writeln!(svg, "<path class=\"band\" d=\"M{around}z\" fill=\"{color}\" opacity=\"0.15\"/>");
+    }
+    let _ = writeln!(svg, "<path d=\"M{}\" {stroke}/>", way(&mut points.iter().map(|p| (x(p.x), y(p.value)))));
+    let every = if series.dense { points.len().div_ceil(FEW_MARKERS) } else { 1 };
+    for point in points.iter().rev().step_by(every).rev() {
+        let at = x(point.x);
+        if !series.dense {
+            let [low, high] = point.interval.map(&y);
+            let bar = format!("M{at:.1} {low:.1}V{high:.1}M{:.1} {low:.1}h6M{:.1} {high:.1}h6", at - 3.0, at - 3.0);
+            let _ = writeln!(svg, "<path class=\"interval\" d=\"{bar}\" fill=\"none\" stroke=\"{color}\" stroke-width=\"1.5\"/>");
+        }
+        for single in &point.singles {
+            let (cx, cy) = (at + SINGLES_RIGHT, y(*single));
+            let _ = writeln!(
+                svg,
+                "<circle class=\"single\" cx=\"{cx:.1}\" cy=\"{cy:.1}\" r=\"2\" fill=\"{color}\" opacity=\"0.6\"/>"
+            );
+        }
+        svg += &marker(series.look, at, y(point.value), "mean");
+    }
+    svg
+}
+
+/// Names at the ends of lines, moved apart where they would lie on each other.
+fn ends(panel: &Panel, x: f64, y: impl Fn(f64) -> f64) -> String {
+    let last = |series: &Series| series.points.iter().rev().find(|p| p.value.is_finite()).map(|p| y(p.value));
+    let mut names: Vec<(f64, &str)> = panel.series.iter().filter_map(|s| last(s).map(|y| (y, s.name.as_str()))).collect();
+    names.sort_by(|a, b| a.0.total_cmp(&b.0));
+    for i in 1..names.len() {
+        names[i].0 = names[i].0.max(names[i - 1].0 + LINE);
+    }
+    // Those that were pushed below the axis go up again.
+    let mut lowest = y(0.0).max(names.first().map_or(0.0, |n| n.0));
+    for name in names.iter_mut().rev() {
+        name.0 = name.0.min(lowest);
+        lowest = name.0 - LINE;
+    }
+    names.iter().map(|(y, name)| text(x, y + 4.0, "start", "chart-small", name)).collect()
+}
+
+/// Lowest value and step of the y axis.
+fn y_axis(panels: &[Panel]) -> (f64, f64) {
+    let points = panels.iter().flat_map(|panel| &panel.series).flat_map(|s| &s.points);
+    let lowest = points.flat_map(|p| p.singles.iter().copied().chain([p.value, p.interval[0]])).fold(1.0, f64::min);
+    let floor = |step: f64| ((lowest / step).floor() * step).clamp(0.0, 1.0 - step);
+    let fits = |step: &f64| (1.0 - floor(*step)) / step <= MOST_TICKS + 0.5;
+    let step = Y_STEPS.into_iter().find(fits).unwrap_or(Y_STEPS[Y_STEPS.len() - 1]);
+    (floor(step), step)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn chart() -> Chart {
+        let series = |name: &str, look: usize, first: f64, missing: usize| {
+            let point = |x: usize| {
+                let value = first + 0.05 * x as f64;
+                Point { x: x as f64, value, interval: [value - 0.03, value + 0.01], singles: vec![value - 0.01; x + 1] }
+            };
+            Series { name: name.into(), look, points: (missing..3).map(point).collect(), dense: false }
+        };
+        let panel = |title: &str, first: f64| Panel {
+            title: title.into(),
+            series: vec![series("a & b", 0, first, 0), series("c<d", 1, first, 1)],
+        };
+        Chart {
+            id: "some".into(),
+            title: "\"success\" > 0".into(),
+            description: "two panels".into(),
+            x_label: "demos".into(),
+            y_label: "success".into(),
+            note: String::new(),
+            x: Axis::Categories(["25", "50", "100"].map(String::from).to_vec()),
+            percent: true,
+            panels: vec![panel("one", 0.87), panel("two", 0.1)],
+        }
+    }
+
+    #[test]
+    fn the_picture_parses_and_has_one_marker_for_each_datum() {
+        let (chart, svg) = (chart(), chart().draw().to_svg());
+        let document = roxmltree::Document::parse(&svg).expect("XML");
+        let count = |class: &str| document.descendants().filter(|n| n.attribute("class") == Some(class)).count();
+        let points: Vec<&Point> = chart.panels.iter().flat_map(|p| &p.series).flat_map(|s| &s.points).collect();
+        assert_eq!((points.len(), count("mean"), count("interval"), count("key")), (10, 10, 10, 2));
+        assert_eq!(count("single"), points.iter().map(|p| p.singles.len()).sum::<usize>());
+        let words: Vec<&str> = document.descendants().filter_map(|n| n.text()).collect();
+        for word in ["a & b", "c<d", "\"success\" > 0", "two panels", "demos", "25", "100", "80 %", "100 %", "0 %"] {
+            assert!(words.contains(&word), "{word} is not written in {words:?}");
+        }
+    }
+
+    #[test]
+    fn higher_values_stand_higher_and_inside_the_axes() {
+        let svg = chart().draw().to_svg();
+        let document = roxmltree::Document::parse(&svg).expect("XML");
+        let heights: Vec<f64> = document
+            .descendants()
+            .filter(|n| n.attribute("class") == Some("single"))
+            .map(|n| n.attribute("cy").and_then(|y| y.parse().ok()).expect("a height"))
+            .collect();
+        assert!(heights.iter().all(|y| (TOP..=TOP + PLOT_HEIGHT).contains(y)), "{heights:?}");
+        assert!(heights[0] > heights[1] && heights[1] > heights[3], "{heights:?}");
+    }
+
+    #[test]
+    fn a_dense_line_has_a_band_and_few_markers_and_leaves_out_what_the_axis_cannot_hold() {
+        let mut chart = chart();
+        let point = |x: u32| Point { x: f64::from(x), value: 0.5, interval: [0.4, 0.6], singles: vec![] };
+        let line = Series { name: "long".into(), look: 2, points: (0..100).map(point).collect(), dense: true };
+        (chart.x, chart.panels) = (Axis::Log, vec![Panel { title: String::new(), series: vec![line] }]);
+        let svg = chart.draw().inline();
+        assert_eq!((svg.matches("class=\"band\"").count(), svg.matches("class=\"mean\"").count()), (1, 6));
+        assert!(!svg.contains("NaN") && !svg.contains("inf") && !svg.contains("xmlns"), "{svg}");
+    }
+
+    #[test]
+    fn the_y_axis_is_fine_near_one_and_begins_at_zero_for_low_values() {
+        let (panels, close) = (chart().panels, |a: f64, b: f64| (a - b).abs() < 1e-9);
+        let ((low, step), (zero, coarse)) = (y_axis(&panels[..1]), y_axis(&panels));
+        assert!(close(low, 0.80) && close(step, 0.05) && close(zero, 0.0) && close(coarse, 0.2), "{low} {step} {zero} {coarse}");
+    }
+}
