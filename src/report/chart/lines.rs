@@ -1,7 +1,7 @@
 //! Line charts: values over an axis with intervals and single observations, in panels side by side.
 
-use super::picture::{Picture, color, escaped, legend, marker, stroke, text, width_of};
-use super::scale::{Axis, Scale};
+use super::picture::{Picture, color, escaped, legend, marker, names_at, stroke, text, width_of};
+use super::scale::{Axis, Scale, up_to_one};
 use std::fmt::Write;
 
 /// A figure of panels that share their axes, title and legend.
@@ -75,8 +75,6 @@ const BETWEEN: f64 = 82.0;
 const UNDER: f64 = 38.0;
 /// Right of each panel, beside the names at the ends of its lines.
 const GAP: f64 = 44.0;
-/// Names at the ends of lines stand this far apart at least.
-const LINE: f64 = 14.0;
 /// Series stand this far apart at the same category, so that their intervals can be told apart; more would make lines cross that do not.
 const DODGE: f64 = 4.0;
 /// Single observations stand this far right of their value.
@@ -85,10 +83,6 @@ const SINGLES_RIGHT: f64 = 5.0;
 const FEW_MARKERS: usize = 6;
 /// Panels in a row.
 const COLUMNS: usize = 3;
-
-/// Steps of the y axis, the finest first; the first with at most [`MOST_TICKS`] steps is taken.
-const Y_STEPS: [f64; 5] = [0.01, 0.02, 0.05, 0.1, 0.2];
-const MOST_TICKS: f64 = 6.0;
 
 impl Chart {
     /// The picture. Each value is one element of class `mean` with its interval of class `interval`, each observation one of class `single`;
@@ -135,7 +129,7 @@ impl Chart {
 
     /// One panel with its upper left corner there.
     fn axes(&self, panel: &Panel, scale: &Scale, left: f64, top: f64) -> String {
-        let (low, step) = y_axis(&self.panels);
+        let (low, step) = up_to_one(lowest(&self.panels));
         let y = |value: f64| top + PLOT_HEIGHT * (1.0 - value) / (1.0 - low);
         let x = |value: f64| left + PLOT_WIDTH * scale.share(value);
         let (bottom, right) = (top + PLOT_HEIGHT, left + PLOT_WIDTH);
@@ -158,7 +152,9 @@ impl Chart {
             svg += &line(series, scale, |value| x(value) + shift, y);
         }
         if panel.series.len() > 1 {
-            svg += &ends(panel, right + 6.0, y);
+            let last = |series: &Series| series.points.iter().rev().find(|p| p.value.is_finite()).map(|p| y(p.value));
+            let names = panel.series.iter().filter_map(|series| last(series).map(|y| (y, series.name.as_str())));
+            svg += &names_at(right + 6.0, names.collect(), bottom);
         }
         svg
     }
@@ -203,31 +199,10 @@ fn line(series: &Series, scale: &Scale, x: impl Fn(f64) -> f64, y: impl Fn(f64) 
     svg
 }
 
-/// Names at the ends of lines, moved apart where they would lie on each other.
-fn ends(panel: &Panel, x: f64, y: impl Fn(f64) -> f64) -> String {
-    let last = |series: &Series| series.points.iter().rev().find(|p| p.value.is_finite()).map(|p| y(p.value));
-    let mut names: Vec<(f64, &str)> = panel.series.iter().filter_map(|s| last(s).map(|y| (y, s.name.as_str()))).collect();
-    names.sort_by(|a, b| a.0.total_cmp(&b.0));
-    for i in 1..names.len() {
-        names[i].0 = names[i].0.max(names[i - 1].0 + LINE);
-    }
-    // Those that were pushed below the axis go up again.
-    let mut lowest = y(0.0).max(names.first().map_or(0.0, |n| n.0));
-    for name in names.iter_mut().rev() {
-        name.0 = name.0.min(lowest);
-        lowest = name.0 - LINE;
-    }
-    names.iter().map(|(y, name)| text(x, y + 4.0, "start", "chart-small", name)).collect()
-}
-
-/// Lowest value and step of the y axis.
-fn y_axis(panels: &[Panel]) -> (f64, f64) {
+/// Lowest value that is drawn.
+fn lowest(panels: &[Panel]) -> f64 {
     let points = panels.iter().flat_map(|panel| &panel.series).flat_map(|s| &s.points);
-    let lowest = points.flat_map(|p| p.singles.iter().copied().chain([p.value, p.interval[0]])).fold(1.0, f64::min);
-    let floor = |step: f64| ((lowest / step).floor() * step).clamp(0.0, 1.0 - step);
-    let fits = |step: &f64| (1.0 - floor(*step)) / step <= MOST_TICKS + 0.5;
-    let step = Y_STEPS.into_iter().find(fits).unwrap_or(Y_STEPS[Y_STEPS.len() - 1]);
-    (floor(step), step)
+    points.flat_map(|p| p.singles.iter().copied().chain([p.value, p.interval[0]])).fold(1.0, f64::min)
 }
 
 #[cfg(test)]
@@ -295,12 +270,5 @@ mod tests {
         let svg = chart.draw().inline();
         assert_eq!((svg.matches("class=\"band\"").count(), svg.matches("class=\"mean\"").count()), (1, 6));
         assert!(!svg.contains("NaN") && !svg.contains("inf") && !svg.contains("xmlns"), "{svg}");
-    }
-
-    #[test]
-    fn the_y_axis_is_fine_near_one_and_begins_at_zero_for_low_values() {
-        let (panels, close) = (chart().panels, |a: f64, b: f64| (a - b).abs() < 1e-9);
-        let ((low, step), (zero, coarse)) = (y_axis(&panels[..1]), y_axis(&panels));
-        assert!(close(low, 0.80) && close(step, 0.05) && close(zero, 0.0) && close(coarse, 0.2), "{low} {step} {zero} {coarse}");
     }
 }

@@ -11,6 +11,8 @@ const DASHES: [&str; LOOKS] = ["none", "6 4", "2 3", "10 3 2 3", "14 4", "1 5"];
 const MARKER: f64 = 4.5;
 /// An average letter of a label \[pixels\].
 const LETTER: f64 = 6.8;
+/// Names at the ends of lines stand this far apart at least \[pixels\].
+const LINE: f64 = 14.0;
 /// What a legend's entry has beside its letters \[pixels\].
 const KEY: f64 = 48.0;
 
@@ -96,6 +98,20 @@ pub(super) fn legend(entries: &[(usize, &str)], left: f64, y: f64) -> String {
         x += width_of(name) + KEY;
     }
     svg
+}
+
+/// Names at the ends of lines with their heights, moved apart where they would lie on each other, none below `bottom`.
+pub(super) fn names_at(x: f64, mut names: Vec<(f64, &str)>, bottom: f64) -> String {
+    names.sort_by(|a, b| a.0.total_cmp(&b.0));
+    for i in 1..names.len() {
+        names[i].0 = names[i].0.max(names[i - 1].0 + LINE);
+    }
+    let mut lowest = bottom;
+    for name in names.iter_mut().rev() {
+        name.0 = name.0.min(lowest);
+        lowest = name.0 - LINE;
+    }
+    names.iter().map(|(y, name)| text(x, y + 4.0, "start", "chart-small", name)).collect()
 }
 
 /// About how wide a label is \[pixels\].

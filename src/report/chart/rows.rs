@@ -84,7 +84,8 @@ impl Rows {
             let top = TOP + row_height * i as f64;
             svg += &text(left - NAMES, top + row_height / 2.0 + 4.0, "end", "", &row.name);
             for datum in &row.data {
-                let at = series.iter().position(|(look, name)| (*look, *name) == (datum.look, datum.series.as_str())).unwrap_or(0);
+                let at =
+                    series.iter().position(|(look, name)| (*look, *name) == (datum.look, datum.series.as_str())).unwrap_or(0);
                 let y = top + ROW / 2.0 + SERIES * (at as f64 + 0.5);
                 svg += &draw(datum, left + datum.panel as f64 * (PLOT_WIDTH + GAP), y);
             }

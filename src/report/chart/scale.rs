@@ -78,6 +78,17 @@ impl Scale {
     }
 }
 
+/// Steps of an axis of shares, the finest first; the first with at most [`MOST_TICKS`] steps is taken.
+const SHARE_STEPS: [f64; 5] = [0.01, 0.02, 0.05, 0.1, 0.2];
+
+/// Lower end and step of an axis that ends at 1 and shows `lowest`.
+pub(super) fn up_to_one(lowest: f64) -> (f64, f64) {
+    let floor = |step: f64| ((lowest / step).floor() * step).clamp(0.0, 1.0 - step);
+    let fits = |step: &f64| (1.0 - floor(*step)) / step <= MOST_TICKS + 0.5;
+    let step = SHARE_STEPS.into_iter().find(fits).unwrap_or(SHARE_STEPS[SHARE_STEPS.len() - 1]);
+    (floor(step), step)
+}
+
 /// `0.5`, `200`, `50k`, `2M`.
 fn number(value: f64) -> String {
     let short = |value: f64| {
@@ -107,6 +118,12 @@ mod tests {
         assert_eq!(ticks(&Scale::over(&Axis::Log, [10.0, 100.0].into_iter())), ["10", "20", "50", "100"]);
         assert_eq!(ticks(&Scale::over(&Axis::Log, [9e3, 4e6].into_iter())), ["10k", "100k", "1M"]);
         assert_eq!(ticks(&Scale::over(&Axis::Linear, std::iter::empty())).len(), 6);
+    }
+
+    #[test]
+    fn an_axis_of_shares_is_fine_near_one_and_begins_at_zero_for_low_values() {
+        let close = |a: (f64, f64), b: (f64, f64)| (a.0 - b.0).abs() < 1e-9 && (a.1 - b.1).abs() < 1e-9;
+        assert!(close(up_to_one(0.84), (0.80, 0.05)) && close(up_to_one(0.07), (0.0, 0.2)), "{:?}", up_to_one(0.84));
     }
 
     #[test]

@@ -84,7 +84,8 @@ impl Space {
     /// Low and high ends along x, y and z \[m\], with room for every point.
     fn bounds(&self) -> [[f64; 2]; 3] {
         let paths = || self.panels.iter().flat_map(|panel| &panel.paths);
-        let points = || paths().flat_map(|path| path.points.iter().chain([&path.target])).filter(|p| p.iter().all(|v| v.is_finite()));
+        let points =
+            || paths().flat_map(|path| path.points.iter().chain([&path.target])).filter(|p| p.iter().all(|v| v.is_finite()));
         [0, 1, 2].map(|axis| {
             let [low, high] = points().fold([f64::MAX, f64::MIN], |[low, high], p| [low.min(p[axis]), high.max(p[axis])]);
             let [low, high] = if low > high { [0.0, 1.0] } else { [low, high] };

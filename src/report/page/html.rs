@@ -11,8 +11,8 @@ impl Page {
     pub fn to_html(&self) -> String {
         let title = escaped(&self.title);
         let mut html = format!(
-            "<!doctype html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n<meta name=\"viewport\" content=\"width=device-width, \
-             initial-scale=1\">\n<meta name=\"color-scheme\" content=\"light dark\">\n<title>{title}</title>\n<link rel=\"icon\" href=\"data:,\">\n\
+            "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\"/>\n<meta name=\"viewport\" content=\"width=device-width, \
+             initial-scale=1\"/>\n<meta name=\"color-scheme\" content=\"light dark\"/>\n<title>{title}</title>\n<link rel=\"icon\" href=\"data:,\"/>\n\
              <style>\n{STYLE}</style>\n</head>\n<body>\n<header>\n<h1>{title}</h1>\n{}</header>\n",
             blocks(&self.lead)
         );
@@ -127,7 +127,12 @@ mod tests {
     #[test]
     fn markdown_says_the_same() {
         let text = page().to_markdown();
-        for part in ["# T\n", "- one\n", "## A & B\n", "| name | pick-up: paper | pick-up: ours |\n|---|---:|---:|\n| x \\| y | .5 | **1** |\n"] {
+        for part in [
+            "# T\n",
+            "- one\n",
+            "## A & B\n",
+            "| name | pick-up: paper | pick-up: ours |\n|---|---:|---:|\n| x \\| y | .5 | **1** |\n",
+        ] {
             assert!(text.contains(part), "{part} is missing in {text}");
         }
     }

@@ -81,7 +81,19 @@ fn drawn(values: &[f64], draw: &mut Draw) -> Vec<f64> {
 /// The Mann-Whitney statistic as a share of all pairs, mean over tasks.
 fn improvement(tasks: &[(Vec<f64>, Vec<f64>)]) -> f64 {
     let of_task = |(x, y): &(Vec<f64>, Vec<f64>)| {
-        let against = |x: &f64| y.iter().map(|y| if x > y { 1.0 } else if x == y { EVEN } else { 0.0 }).sum::<f64>();
+        let against = |x: &f64| {
+            y.iter()
+                .map(|y| {
+                    if x > y {
+                        1.0
+                    } else if x == y {
+                        EVEN
+                    } else {
+                        0.0
+                    }
+                })
+                .sum::<f64>()
+        };
         x.iter().map(against).sum::<f64>() / (x.len() * y.len()) as f64
     };
     average(&tasks.iter().map(of_task).collect::<Vec<_>>())

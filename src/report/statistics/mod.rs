@@ -104,8 +104,7 @@ mod tests {
         close(iqm.value, 0.657_777_777_777, 1e-9);
         close(mean.value, 0.66, 1e-12);
         // 10,000 draws against 50,000 of other random numbers.
-        for (ours, theirs) in
-            iqm.interval.into_iter().chain(mean.interval).zip([0.622_222_22, 0.686_666_67, 0.632, 0.688_666_67])
+        for (ours, theirs) in iqm.interval.into_iter().chain(mean.interval).zip([0.622_222_22, 0.686_666_67, 0.632, 0.688_666_67])
         {
             close(ours, theirs, 0.004);
         }
