@@ -73,14 +73,16 @@ const BOTTOM: f64 = 40.0;
 const BETWEEN: f64 = 82.0;
 /// Under the last row, for ticks and label.
 const UNDER: f64 = 38.0;
-/// Right of each panel, beside the names at the ends of its lines.
-const GAP: f64 = 44.0;
+/// Right of each panel, for the next one's numbers, beside the names at the ends of its lines.
+const GAP: f64 = 62.0;
 /// Series stand this far apart at the same category, so that their intervals can be told apart; more would make lines cross that do not.
 const DODGE: f64 = 4.0;
 /// Single observations stand this far right of their value.
 const SINGLES_RIGHT: f64 = 5.0;
 /// Markers of a dense line.
 const FEW_MARKERS: usize = 6;
+/// The last point is the last marker, however its place is rounded.
+const ROUNDING: f64 = 1e-9;
 /// Panels in a row.
 const COLUMNS: usize = 3;
 
@@ -179,8 +181,8 @@ fn line(series: &Series, scale: &Scale, x: impl Fn(f64) -> f64, y: impl Fn(f64) 
         let _ = writeln!(svg, "<path class=\"band\" d=\"M{around}z\" fill=\"{color}\" opacity=\"0.15\"/>");
     }
     let _ = writeln!(svg, "<path d=\"M{}\" {stroke}/>", way(&mut points.iter().map(|p| (x(p.x), y(p.value)))));
-    let every = if series.dense { points.len().div_ceil(FEW_MARKERS) } else { 1 };
-    for point in points.iter().rev().step_by(every).rev() {
+    let shown = if series.dense { few(&points, scale) } else { points };
+    for point in shown {
         let at = x(point.x);
         if !series.dense {
             let [low, high] = point.interval.map(&y);
@@ -199,6 +201,19 @@ fn line(series: &Series, scale: &Scale, x: impl Fn(f64) -> f64, y: impl Fn(f64) 
     svg
 }
 
+/// Some of many points, about as far from each other along the axis, the last among them.
+fn few<'a>(points: &[&'a Point], scale: &Scale) -> Vec<&'a Point> {
+    let (first, last) = (scale.share(points[0].x), scale.share(points[points.len() - 1].x));
+    let mut shown: Vec<&Point> = Vec::new();
+    for point in points {
+        let passed = (scale.share(point.x) - first) / (last - first).max(f64::MIN_POSITIVE) * FEW_MARKERS as f64;
+        if passed + ROUNDING >= (shown.len() + 1) as f64 {
+            shown.push(point);
+        }
+    }
+    shown
+}
+
 /// Lowest value that is drawn.
 fn lowest(panels: &[Panel]) -> f64 {
     let points = panels.iter().flat_map(|panel| &panel.series).flat_map(|s| &s.points);
@@ -206,69 +221,5 @@ fn lowest(panels: &[Panel]) -> f64 {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn chart() -> Chart {
-        let series = |name: &str, look: usize, first: f64, missing: usize| {
-            let point = |x: usize| {
-                let value = first + 0.05 * x as f64;
-                Point { x: x as f64, value, interval: [value - 0.03, value + 0.01], singles: vec![value - 0.01; x + 1] }
-            };
-            Series { name: name.into(), look, points: (missing..3).map(point).collect(), dense: false }
-        };
-        let panel = |title: &str, first: f64| Panel {
-            title: title.into(),
-            series: vec![series("a & b", 0, first, 0), series("c<d", 1, first, 1)],
-        };
-        Chart {
-            id: "some".into(),
-            title: "\"success\" > 0".into(),
-            description: "two panels".into(),
-            x_label: "demos".into(),
-            y_label: "success".into(),
-            note: String::new(),
-            x: Axis::Categories(["25", "50", "100"].map(String::from).to_vec()),
-            percent: true,
-            panels: vec![panel("one", 0.87), panel("two", 0.1)],
-        }
-    }
-
-    #[test]
-    fn the_picture_parses_and_has_one_marker_for_each_datum() {
-        let (chart, svg) = (chart(), chart().draw().to_svg());
-        let document = roxmltree::Document::parse(&svg).expect("XML");
-        let count = |class: &str| document.descendants().filter(|n| n.attribute("class") == Some(class)).count();
-        let points: Vec<&Point> = chart.panels.iter().flat_map(|p| &p.series).flat_map(|s| &s.points).collect();
-        assert_eq!((points.len(), count("mean"), count("interval"), count("key")), (10, 10, 10, 2));
-        assert_eq!(count("single"), points.iter().map(|p| p.singles.len()).sum::<usize>());
-        let words: Vec<&str> = document.descendants().filter_map(|n| n.text()).collect();
-        for word in ["a & b", "c<d", "\"success\" > 0", "two panels", "demos", "25", "100", "80 %", "100 %", "0 %"] {
-            assert!(words.contains(&word), "{word} is not written in {words:?}");
-        }
-    }
-
-    #[test]
-    fn higher_values_stand_higher_and_inside_the_axes() {
-        let svg = chart().draw().to_svg();
-        let document = roxmltree::Document::parse(&svg).expect("XML");
-        let heights: Vec<f64> = document
-            .descendants()
-            .filter(|n| n.attribute("class") == Some("single"))
-            .map(|n| n.attribute("cy").and_then(|y| y.parse().ok()).expect("a height"))
-            .collect();
-        assert!(heights.iter().all(|y| (TOP..=TOP + PLOT_HEIGHT).contains(y)), "{heights:?}");
-        assert!(heights[0] > heights[1] && heights[1] > heights[3], "{heights:?}");
-    }
-
-    #[test]
-    fn a_dense_line_has_a_band_and_few_markers_and_leaves_out_what_the_axis_cannot_hold() {
-        let mut chart = chart();
-        let point = |x: u32| Point { x: f64::from(x), value: 0.5, interval: [0.4, 0.6], singles: vec![] };
-        let line = Series { name: "long".into(), look: 2, points: (0..100).map(point).collect(), dense: true };
-        (chart.x, chart.panels) = (Axis::Log, vec![Panel { title: String::new(), series: vec![line] }]);
-        let svg = chart.draw().inline();
-        assert_eq!((svg.matches("class=\"band\"").count(), svg.matches("class=\"mean\"").count()), (1, 6));
-        assert!(!svg.contains("NaN") && !svg.contains("inf") && !svg.contains("xmlns"), "{svg}");
-    }
-}
+#[path = "lines_tests.rs"]
+mod tests;

@@ -38,7 +38,7 @@ pub struct Datum {
     pub panel: usize,
     /// Colour and marker, below [`super::LOOKS`].
     pub look: usize,
-    /// In the legend; empty = it needs none.
+    /// In the legend, where there are several.
     pub series: String,
     /// The value.
     pub value: f64,
@@ -50,7 +50,7 @@ pub struct Datum {
 
 // Sizes in pixels.
 const PLOT_WIDTH: f64 = 250.0;
-const GAP: f64 = 34.0;
+const GAP: f64 = 52.0;
 const LEFT: f64 = 24.0;
 const RIGHT: f64 = 28.0;
 const TOP: f64 = 92.0;
@@ -75,8 +75,9 @@ impl Rows {
         let bottom = TOP + row_height * self.rows.len() as f64;
         let height = bottom + BOTTOM;
         let mut svg = text(LEFT, 26.0, "start", "chart-title", &self.title);
-        let named: Vec<(usize, &str)> = series.iter().filter(|(_, name)| !name.is_empty()).copied().collect();
-        svg += &legend(&named, LEFT, 50.0);
+        if series.len() > 1 {
+            svg += &legend(&series, LEFT, 50.0);
+        }
         for (i, title) in self.panels.iter().enumerate() {
             svg += &self.axes(title, left + i as f64 * (PLOT_WIDTH + GAP), bottom);
         }

@@ -52,6 +52,8 @@ const AZIMUTH_RAD: f64 = 0.9;
 const ELEVATION_RAD: f64 = 0.45;
 /// The box ends at multiples of this \[m\].
 const STEP_M: f64 = 0.1;
+/// And is no narrower \[m\].
+const LEAST_M: f64 = 0.2;
 
 /// Points of the world on paper, to the right and up \[m\].
 fn project([x, y, z]: [f64; 3]) -> [f64; 2] {
@@ -90,7 +92,8 @@ impl Space {
             let [low, high] = points().fold([f64::MAX, f64::MIN], |[low, high], p| [low.min(p[axis]), high.max(p[axis])]);
             let [low, high] = if low > high { [0.0, 1.0] } else { [low, high] };
             let low = if axis == 2 { low.min(0.0) } else { low };
-            [(low / STEP_M).floor() * STEP_M, ((high / STEP_M).floor() + 1.0) * STEP_M]
+            let (low, high) = ((low / STEP_M).floor() * STEP_M, ((high / STEP_M).floor() + 1.0) * STEP_M);
+            [low, high.max(low + LEAST_M)]
         })
     }
 }

@@ -5,7 +5,7 @@ use super::words::{listed, percent, percent_within, seeds};
 use crate::experiment::estimate::{in_words, wall_s_of};
 use crate::report::chart::{Datum, Picture, Row, Rows};
 use crate::report::page::{Block, Cell, Column, Table};
-use crate::report::statistics::{interquartile_mean, mean};
+use crate::report::statistics::{Strata, interquartile_mean, mean};
 use crate::task::Task;
 use crate::tasks::FailureClass;
 
@@ -66,7 +66,7 @@ pub fn success_figure(finished: &Finished) -> Picture {
     }
     let rows = Rows {
         id: format!("{}-success", experiment.name),
-        title: format!("Success: {}", experiment.description),
+        title: experiment.description.clone(),
         description:
             "Success rates with intervals, a row for each variation and a panel for each task; the table below has the numbers"
                 .into(),
@@ -98,8 +98,8 @@ pub fn success_table(finished: &Finished) -> Table {
     Table { caption, columns, rows: finished.arms().iter().map(row).collect() }
 }
 
-/// Interquartile mean and mean of every arm over all tasks; `None` where they say nothing new.
-pub fn aggregates(finished: &Finished) -> Option<Block> {
+/// Interquartile mean and mean of these arms over all tasks; `None` where they say nothing new.
+pub fn aggregates(finished: &Finished, arms: &[Arm]) -> Option<Block> {
     let tasks = finished.tasks();
     if tasks.len() < 2 {
         return None;
@@ -107,15 +107,19 @@ pub fn aggregates(finished: &Finished) -> Option<Block> {
     let row = |arm: &Arm| {
         let has_runs = |task: &&Task| finished.of(*arm, **task).next().is_some();
         let tasks: Vec<Task> = tasks.iter().filter(has_runs).copied().collect();
-        let strata = finished.strata(*arm, &tasks);
-        let seeds = strata.iter().map(|task| task.len().to_string()).collect::<Vec<_>>().join(" + ");
+        let strata = balanced(finished.strata(*arm, &tasks));
+        let count = strata[0].len();
         let names = if tasks.len() == finished.tasks().len() {
             "all".into()
         } else {
             tasks.iter().map(|t| t.name()).collect::<Vec<_>>().join(", ")
         };
-        let values = [interquartile_mean(&strata), mean(&strata)].map(percent_within);
-        let mut cells = [finished.label(*arm), names, seeds].map(Cell::from).to_vec();
+        let values = [interquartile_mean, mean].map(|statistic| match count {
+            0 => "–".into(),
+            1 => percent(statistic(&strata).value),
+            _ => percent_within(statistic(&strata)),
+        });
+        let mut cells = [finished.label(*arm), names, count.to_string()].map(Cell::from).to_vec();
         cells.extend(values.map(Cell::from));
         cells
     };
@@ -126,8 +130,16 @@ pub fn aggregates(finished: &Finished) -> Option<Block> {
         Column::number("interquartile mean, %"),
         Column::number("mean, %"),
     ];
-    let caption = "Success over all tasks, with 95 % intervals by the bootstrap over seeds within tasks.".into();
-    Some(Block::Table(Table { caption, columns, rows: finished.arms().iter().map(row).collect() }))
+    let caption =
+        "Success over all tasks, of the seeds that every task has, with 95 % intervals by the bootstrap over seeds within tasks."
+            .into();
+    Some(Block::Table(Table { caption, columns, rows: arms.iter().map(row).collect() }))
+}
+
+/// The seeds that every task has, so that no task counts more than another.
+fn balanced(strata: Strata) -> Strata {
+    let everywhere = |seed: u64| strata.iter().all(|task| task.iter().any(|score| score.seed == seed));
+    strata.iter().map(|task| task.iter().filter(|score| everywhere(score.seed)).copied().collect()).collect()
 }
 
 /// Failed episodes by class, a row an arm and task; classes that never came are left out.
@@ -177,14 +189,15 @@ pub fn how_made(finished: &Finished) -> Block {
     } else {
         experiment.path.display().to_string()
     };
+    let (there, asked) = (seeds(&runs), seeds(&experiment.seeds));
     let plural = if experiment.presets.len() == 1 { "preset" } else { "presets" };
     Block::Words(format!(
-        "Made by `hilt experiment {name}`: {plural} {}, methods {}, seeds {} of {}, {episodes} episodes an evaluation; {done} of {all} runs finished; \
+        "Made by `hilt experiment {name}`: {plural} {}, {} {}, seeds {}, {episodes} episodes an evaluation; {done} of {all} runs finished; \
          {} steps took {} of wall time, added up.",
         listed(&experiment.presets),
+        if methods.len() == 1 { "method" } else { "methods" },
         listed(&methods),
-        seeds(&runs),
-        seeds(&experiment.seeds),
+        if there == asked { there } else { format!("{there} of {asked}") },
         steps.count(),
         in_words(wall_s),
     ))

@@ -54,10 +54,7 @@ pub fn compare(finished: &Finished, x: Arm, y: Arm, tasks: &[Task]) -> Option<Co
 /// with the reference.
 fn pairs(finished: &Finished) -> Vec<Pair<'_>> {
     let experiment = &finished.experiment;
-    let arms = match experiment.report {
-        ReportKind::Training => super::training::longest(finished),
-        _ => finished.arms(),
-    };
+    let arms = arms(finished);
     let below = |arm: &Arm| match experiment.report {
         ReportKind::Ladder => experiment.variations.iter().find(|v| v.name == arm.variation)?.extends.clone(),
         _ => experiment.reference.clone().or_else(|| experiment.variations.first().map(|v| v.name.clone())),
@@ -78,6 +75,14 @@ fn pairs(finished: &Finished) -> Vec<Pair<'_>> {
         }
     }
     pairs
+}
+
+/// The arms that are compared: all, but of trainings of several lengths the longest of each method.
+pub fn arms(finished: &Finished) -> Vec<Arm<'_>> {
+    match finished.experiment.report {
+        ReportKind::Training => super::training::longest(finished),
+        _ => finished.arms(),
+    }
 }
 
 fn in_words(compared: &[Compared]) -> Vec<Block> {
@@ -107,7 +112,9 @@ fn table(caption: String, compared: &[Compared]) -> Table {
             Verdict::CannotTell => "cannot be told apart",
             Verdict::TooFew => "too few seeds",
         };
-        let (difference, improvement) = (points_within(c.found.difference), probability_within(c.found.improvement));
+        let alone = |words: String| if c.found.pairs > 1 { words } else { words.split(" [").next().unwrap_or_default().into() };
+        let difference = alone(points_within(c.found.difference));
+        let improvement = alone(probability_within(c.found.improvement));
         let [x, y] = &c.names;
         let words = [x.clone(), y.clone(), c.tasks.clone(), c.found.pairs.to_string(), difference, improvement, verdict.into()];
         words.map(Cell::from).to_vec()

@@ -27,7 +27,7 @@ pub fn section(finished: &Finished, interrupt: &Interrupt) -> Result<Section> {
     });
     let by_rows = matches!(experiment.report, ReportKind::Success | ReportKind::Ladder | ReportKind::Table2 | ReportKind::Table3);
     if by_rows {
-        let caption = format!("{} {}", experiment.description, common::intervals(finished));
+        let caption = format!("Success by task. {}", common::intervals(finished));
         blocks.push(Block::Figure(common::success_figure(finished), caption));
     }
     let table = Block::Table(common::success_table(finished));
@@ -36,7 +36,7 @@ pub fn section(finished: &Finished, interrupt: &Interrupt) -> Result<Section> {
         _ => blocks.push(Block::Details("Success in numbers".into(), vec![table])),
     }
     if experiment.report != ReportKind::Paths {
-        blocks.extend(common::aggregates(finished));
+        blocks.extend(common::aggregates(finished, &comparisons::arms(finished)));
         blocks.extend(comparisons::blocks(finished));
     }
     blocks.extend(common::failures(finished));

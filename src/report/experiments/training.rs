@@ -167,9 +167,9 @@ pub fn longest(finished: &Finished) -> Vec<Arm<'_>> {
     })
 }
 
-/// The shortest of lengths in order, from which on every mean lies within or above the interval of the longest.
+/// The shortest of lengths in order, from which on every mean lies within or above the interval of the longest; `None` where that reaches down to 0.
 fn plateau(successes: &[Estimate]) -> Option<usize> {
-    let enough = successes.last()?.interval[0];
+    let enough = successes.last().map(|last| last.interval[0]).filter(|low| *low > 0.0)?;
     let below = successes.iter().rposition(|success| success.value < enough);
     Some(below.map_or(0, |at| at + 1).min(successes.len() - 1))
 }
@@ -183,17 +183,14 @@ fn plateaus(finished: &Finished, lengths: &[Length], clock: Clock) -> Table {
                 let of = lengths.iter().filter(|l| (l.arm.preset, l.arm.method, l.task) == (preset, *method, task));
                 let of: Vec<&Length> = of.collect();
                 let successes: Vec<Estimate> = of.iter().map(|l| l.success).collect();
-                if let (Some(at), Some(last)) = (plateau(&successes), of.last()) {
-                    let reached = of[at];
+                if let Some(last) = of.last() {
                     let name =
                         if experiment.presets.len() > 1 { format!("{} ({preset})", method.name()) } else { method.name().into() };
-                    let mut cells = [name, task.to_string(), format!("{:.0}", reached.epochs)].map(Cell::from).to_vec();
-                    cells.extend([minutes(reached.train_s), percent_within(reached.success).into()]);
-                    cells.extend([
-                        format!("{:.0}", last.epochs).into(),
-                        minutes(last.train_s),
-                        percent_within(last.success).into(),
-                    ]);
+                    let cells_of =
+                        |l: &Length| [format!("{:.0}", l.epochs).into(), minutes(l.train_s), percent_within(l.success).into()];
+                    let mut cells = vec![Cell::from(name), task.name().into()];
+                    cells.extend(plateau(&successes).map_or(["–", "–", "–"].map(Cell::from), |at| cells_of(of[at])));
+                    cells.extend(cells_of(last));
                     rows.push(cells);
                 }
             }
@@ -211,7 +208,8 @@ fn plateaus(finished: &Finished, lengths: &[Length], clock: Clock) -> Table {
         of("longest training", "success, %"),
     ];
     let caption = format!(
-        "Time to plateau: the shortest training from which on mean success never again lies below the interval of the longest training. Minutes: {}.",
+        "Time to plateau: the shortest training from which on mean success never again lies below the interval of the longest training; a dash \
+         where that interval reaches down to 0. Where it is the longest training itself, success may still be rising. Minutes: {}.",
         clock.name()
     );
     Table { caption, columns, rows }
@@ -228,6 +226,6 @@ mod tests {
         assert_eq!(plateau(&of(&[0.1, 0.87, 0.5, 0.86, 0.9])), Some(3));
         assert_eq!(plateau(&of(&[0.95, 0.9])), Some(0));
         assert_eq!(plateau(&of(&[0.1, 0.9])), Some(1));
-        assert_eq!(plateau(&[]), None);
+        assert_eq!((plateau(&[]), plateau(&of(&[0.0, 0.04]))), (None, None));
     }
 }

@@ -14,10 +14,14 @@ pub fn percent_within(estimate: Estimate) -> String {
     format!("{} [{low}, {high}]", percent(estimate.value))
 }
 
-/// `+3.2 [-1.0, 7.5]`, a difference of shares in points.
+/// `+3.2 [-1.0, +7.5]`, a difference of shares in points.
 pub fn points_within(estimate: Estimate) -> String {
-    let [low, high] = estimate.interval.map(|v| format!("{:+.1}", 100.0 * v));
-    format!("{:+.1} [{low}, {high}]", 100.0 * estimate.value)
+    let signed = |share: f64| match format!("{:+.1}", 100.0 * share) {
+        zero if zero == "+0.0" || zero == "-0.0" => "0.0".into(),
+        other => other,
+    };
+    let [low, high] = estimate.interval.map(signed);
+    format!("{} [{low}, {high}]", signed(estimate.value))
 }
 
 /// `.72 [.55, .88]`, a probability.
@@ -26,9 +30,10 @@ pub fn probability_within(estimate: Estimate) -> String {
     format!("{:.2} [{low:.2}, {high:.2}]", estimate.value)
 }
 
-/// `12.5`, seconds in minutes; a dash for none.
+/// `12.5` or `0.25`, seconds in minutes; a dash for none.
 pub fn minutes(seconds: Option<f64>) -> Cell {
-    seconds.map_or("–".to_string(), |s| format!("{:.1}", s / 60.0)).into()
+    let in_minutes = |s: f64| if s < 60.0 { format!("{:.2}", s / 60.0) } else { format!("{:.1}", s / 60.0) };
+    seconds.map_or("–".to_string(), in_minutes).into()
 }
 
 /// `a, b and c`.
