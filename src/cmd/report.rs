@@ -26,29 +26,7 @@ pub struct Args {
 
 pub fn run(args: &Args, context: &Context) -> Result<Outcome> {
     Places::new().read(&args.runs).write("--out", &args.out, Content::Report).check(&context.console)?;
-    let (mut shown, mut left_out) = (Vec::new(), Vec::new());
-    if args.names.is_empty() {
-        for name in all() {
-            match read(args, &name) {
-                Ok(finished) if !finished.runs.is_empty() => shown.push(finished),
-                Ok(_) => {}
-                // One experiment that was changed after it had begun takes no other from the page.
-                Err(Error::Interrupted) => return Err(Error::Interrupted),
-                Err(why) => left_out.push(format!("`{name}`: {why}")),
-            }
-        }
-    }
-    for name in &args.names {
-        let finished = read(args, name)?;
-        if finished.runs.is_empty() {
-            let (dir, file) = (args.runs.join(&finished.experiment.name), finished.experiment.name);
-            return Err(Error::Failed(format!(
-                "{}: no run of {file} is finished; hilt experiment {name} makes them",
-                dir.display()
-            )));
-        }
-        shown.push(finished);
-    }
+    let (shown, left_out) = if args.names.is_empty() { all_finished(args)? } else { (named(args)?, Vec::new()) };
     left_out.iter().for_each(|why| context.console.say(&format!("report: left out {why}")));
     if shown.is_empty() {
         let dir = args.runs.display();
@@ -63,6 +41,39 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome> {
     let out = args.out.join("index.html");
     context.console.say(&format!("report: wrote {}: {} experiments, {runs} of {of} runs", out.display(), shown.len()));
     Ok(Outcome::Done)
+}
+
+/// All that have a finished run, and why others are left out: one that was changed after it had begun takes no other from the page.
+fn all_finished(args: &Args) -> Result<(Vec<Finished>, Vec<String>)> {
+    let (mut shown, mut left_out) = (Vec::new(), Vec::new());
+    for name in all() {
+        match read(args, &name) {
+            Ok(finished) if finished.runs.is_empty() => {}
+            Ok(finished) => shown.push(finished),
+            Err(Error::Interrupted) => return Err(Error::Interrupted),
+            Err(why) => left_out.push(format!("`{name}`: {why}")),
+        }
+    }
+    Ok((shown, left_out))
+}
+
+/// Those of the command line, each of which must have a finished run.
+fn named(args: &Args) -> Result<Vec<Finished>> {
+    let mut shown: Vec<Finished> = Vec::new();
+    for name in &args.names {
+        let finished = read(args, name)?;
+        let own = finished.experiment.name.clone();
+        if shown.iter().any(|other| other.experiment.name == own) {
+            return Err(Error::Usage(format!("{own}: is named twice; name each experiment once")));
+        }
+        if finished.runs.is_empty() {
+            let dir = args.runs.join(&own);
+            let message = format!("{}: no run of {own} is finished; hilt experiment {name} makes them", dir.display());
+            return Err(Error::Failed(message));
+        }
+        shown.push(finished);
+    }
+    Ok(shown)
 }
 
 fn read(args: &Args, name: &str) -> Result<Finished> {

@@ -22,6 +22,7 @@ with sync_playwright() as playwright:
         for size, (width, height) in sizes.items():
             name = f"{scheme}-{size}"
             page = browser.new_page(viewport={"width": width, "height": height}, color_scheme=scheme)
+            page.set_default_timeout(120_000)  # also on a busy machine
             page.on("request", lambda r: r.url.startswith(("file:", "data:")) or wrong.append(f"{name}: asks for {r.url}"))
             page.on("console", lambda m: m.type in ("error", "warning") and wrong.append(f"{name}: console: {m.text}"))
             page.on("pageerror", lambda e: wrong.append(f"{name}: {e}"))

@@ -130,7 +130,7 @@ fn every_form_of_a_report_is_whole_and_the_same_each_time() {
     place.done(&["experiment", "tiny.toml"]);
     let forms: [(&str, &[&str], &[&str]); 8] = [
         ("success", &["tiny-success"], &["Too few seeds", "adaptive, hil"]),
-        ("table2", &["tiny-success"], &["α = d_conv (HIL)", "84.0", "156"]),
+        ("table2", &["tiny-success"], &["α = d_conv (HIL)", "75.0", "119"]),
         ("table3", &["tiny-success"], &["ρ = 0.3", "failed"]),
         ("convergence", &["tiny-convergence"], &["half way at epoch"]),
         ("training", &["tiny-epochs", "tiny-env-steps", "tiny-time"], &["Time to plateau"]),
@@ -163,6 +163,7 @@ fn a_part_is_shown_as_a_part_and_nothing_is_refused() {
     place.refused(&["report"], 1, "no run of any experiment is finished");
     place.refused(&["report", "tinny"], 2, "no experiment \"tinny\"");
     place.done(&["experiment", "tiny.toml", "--seeds", "11"]);
+    place.refused(&["report", "tiny.toml", "tiny.toml"], 2, "tiny: is named twice");
     place.done(&["report", "tiny.toml", "--out", "page"]);
     check(&place.at("page"));
     let html = fs::read_to_string(place.at("page/index.html")).expect("a page");

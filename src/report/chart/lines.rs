@@ -211,7 +211,7 @@ fn few<'a>(points: &[&'a Point], scale: &Scale) -> Vec<&'a Point> {
             shown.push(point);
         }
     }
-    shown
+    if shown.is_empty() { points[points.len() - 1..].to_vec() } else { shown }
 }
 
 /// Lowest value that is drawn.

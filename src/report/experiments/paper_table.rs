@@ -7,20 +7,29 @@ use crate::report::page::{Block, Cell, Column, Table};
 use crate::report::paper::{PaperRow, PaperTable};
 use crate::report::statistics::Verdict;
 
-/// The table for each preset, and what differs in order.
+/// The table for each preset and method, and what differs in order.
 pub fn blocks(finished: &Finished, paper: &PaperTable) -> Vec<Block> {
+    let experiment = &finished.experiment;
     let mut blocks = Vec::new();
-    for preset in &finished.experiment.presets {
-        let arms: Vec<Arm> = finished.arms().into_iter().filter(|arm| arm.preset == preset).collect();
-        if !arms.is_empty() {
-            blocks.push(Block::Table(table(finished, paper, preset, &arms)));
-            blocks.extend(order(finished, paper, preset, &arms));
+    for preset in &experiment.presets {
+        for method in &experiment.methods {
+            let arms = finished.arms().into_iter().filter(|arm| (arm.preset, arm.method) == (preset, *method));
+            let arms: Vec<Arm> = arms.collect();
+            let of = if experiment.methods.len() > 1 {
+                format!("preset {preset}, method {}", method.name())
+            } else {
+                format!("preset {preset}")
+            };
+            if !arms.is_empty() {
+                blocks.push(Block::Table(table(finished, paper, &of, &arms)));
+                blocks.extend(order(finished, paper, &of, &arms));
+            }
         }
     }
     blocks
 }
 
-fn table(finished: &Finished, paper: &PaperTable, preset: &str, arms: &[Arm]) -> Table {
+fn table(finished: &Finished, paper: &PaperTable, of: &str, arms: &[Arm]) -> Table {
     let tasks = &finished.experiment.tasks;
     let mut columns = vec![Column::words(paper.varies)];
     for task in tasks {
@@ -56,14 +65,14 @@ fn table(finished: &Finished, paper: &PaperTable, preset: &str, arms: &[Arm]) ->
         ""
     };
     let caption = format!(
-        "{name} of the paper beside preset {preset}; the highest of each column stands out. {}{times}",
+        "{name} of the paper beside {of}; the highest of each column stands out. {}{times}",
         super::common::intervals(finished)
     );
     Table { caption, columns, rows: paper.rows.iter().map(row).collect() }
 }
 
 /// Where the order by success is another than the paper's, in words.
-fn order(finished: &Finished, paper: &PaperTable, preset: &str, arms: &[Arm]) -> Vec<Block> {
+fn order(finished: &Finished, paper: &PaperTable, of: &str, arms: &[Arm]) -> Vec<Block> {
     let mut items = Vec::new();
     for task in &finished.experiment.tasks {
         let mut shown: Vec<(&PaperRow, Arm, f64, f64)> = Vec::new();
@@ -105,7 +114,7 @@ fn order(finished: &Finished, paper: &PaperTable, preset: &str, arms: &[Arm]) ->
     if items.is_empty() {
         return Vec::new();
     }
-    vec![Block::Words(format!("The order by success differs from the paper's under preset {preset}:")), Block::List(items)]
+    vec![Block::Words(format!("The order by success differs from the paper's under {of}:")), Block::List(items)]
 }
 
 /// `a > b = c`, the best first.
