@@ -2,7 +2,7 @@ use super::places::{Content, Places};
 use super::{Context, Outcome};
 use crate::data::{atomic, table_file};
 use crate::error::{Error, Result};
-use crate::experiment::{Experiment, Grid, Overrides, all, find, leftovers};
+use crate::experiment::{Experiment, Grid, Overrides, ReportKind, all, find, leftovers};
 use crate::report::experiments::{Finished, is_file, page, run_table, section};
 use crate::report::page::Page;
 use std::path::{Path, PathBuf};
@@ -54,6 +54,11 @@ fn all_finished(args: &Args) -> Result<(Vec<Finished>, Vec<String>)> {
             Err(why) => left_out.push(format!("`{name}`: {why}")),
         }
     }
+    // The paper's tables and figures first, in its order.
+    shown.sort_by_key(|finished| {
+        let kind = finished.experiment.report;
+        (kind == ReportKind::Success, kind as usize)
+    });
     Ok((shown, left_out))
 }
 
