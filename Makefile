@@ -107,7 +107,7 @@ POLICY     := $(DIR)/policy$(OF).safetensors
 EVALUATION := $(DIR)/evaluation$(OF).json
 ARTEFACTS  := $(PLANS) $(RECORDINGS) $(DATASET) $(DYNAMICS) $(POLICY) $(EVALUATION)
 
-.PHONY: all stages smoke experiment table2 table3 figures test cluster-test check interop qemu bench fuzz help clean-runs build need-cargo FORCE $(ARTEFACTS)
+.PHONY: all stages smoke experiment table2 table3 figures report test cluster-test check interop report-test qemu bench fuzz help clean-runs build need-cargo FORCE $(ARTEFACTS)
 
 all: $(EVALUATION) ## run every stage of TASK; writes RUNS/TASK/policy.safetensors and RUNS/TASK/evaluation.json
 	@$(MADE) result
@@ -191,6 +191,9 @@ figures: $(HILT) ## the runs behind the paper's figures 6, 7 and 8
 	$(call EXPERIMENT,figure7-rl)
 	$(call EXPERIMENT,figure8)
 
+report: $(HILT) ## a page of the experiments that have finished runs: RUNS/report/index.html
+	$(HILT) report --runs $(RUNS)/experiments --out $(RUNS)/report --threads $(THREADS) $(call optional,episodes,EPISODES)
+
 # --- the binary ---------------------------------------------------------------------------------------------------------------------
 
 build: $(HILT) ## build the optimised binary
@@ -236,6 +239,9 @@ cluster-test: build ## a tiny experiment through Snakemake and through Slurm on 
 interop: build ## tiny runs of all tasks, read by mcap, pyarrow, DuckDB, pandas, LeRobot and safetensors (needs Python 3.12)
 	for task in $(TASKS); do $(MAKE) --no-print-directory all TASK=$$task RUNS=$(RUNS)/smoke SET="$(SMOKE)"; done
 	tests/interop/run.sh $(RUNS)/smoke
+
+report-test: report ## open that page in headless Chromium: no network, no errors, every figure (needs Python 3; installs Playwright and Chromium)
+	tests/report/browser.sh $(RUNS)/report
 
 qemu: build ## the same bytes as processors with and without FMA, all kernels, another libm (needs qemu-user and cc; minutes)
 	tests/qemu.sh

@@ -35,8 +35,9 @@
 //! - [`tasks`], then [`plan`] (scene to demonstration) and [`sim`] (contact physics, the only home of rapier)
 //! - [`data`]: files, the only home of MCAP, Arrow, Parquet and safetensors; knows no learning
 //! - [`learn`]: networks of policy and dynamics, losses, methods, and the loop around them; knows neither files nor simulator
-//! - [`eval`]: policies in the simulator; [`report`]: pictures, charts, tables
+//! - [`eval`]: policies in the simulator
 //! - [`experiment`]: grids of runs as steps; starts no process
+//! - [`report`]: pictures, charts, tables, statistics over seeds, pages of experiments
 //! - [`cmd`]: the command line
 #![warn(missing_docs)]
 

@@ -5,7 +5,7 @@ use crate::results::{Counted, read};
 use anyhow::{Result, ensure};
 use hilt::data::atomic;
 use hilt::eval::wilson_95;
-use hilt::report::chart::{Chart, Panel, Point, Series};
+use hilt::report::chart::{Axis, Chart, Panel, Point, Series};
 
 /// Methods in the order of legends and columns, with their names.
 const METHODS: [(&str, &str); 3] = [("bc", "BC"), ("sc", "SC"), ("hil", "HIL")];
@@ -38,31 +38,36 @@ pub fn figure(args: &Args) -> Result<()> {
     ensure!(names == ["demos", "features"], "{} is not a result of few-demos: it varies {names:?}", csv.display());
     let mut demos = distinct(rows.iter().map(|r| r.labels[0].clone()));
     demos.sort_by_key(|d| d.parse::<u64>().unwrap_or(u64::MAX));
-    let series = |features: &str, method: &str, name: &str| {
+    let series = |features: &str, look: usize| {
+        let (method, name) = METHODS[look];
         let of =
             |d: &String| rows.iter().filter(|r| r.labels == [d.as_str(), features] && r.method == method).collect::<Vec<_>>();
-        let points = demos.iter().enumerate().filter_map(|(x, d)| {
+        let points = demos.iter().enumerate().filter_map(|(at, d)| {
+            let x = at as f64;
             let rows = of(d);
             let (successes, episodes) = pooled(rows.iter().copied());
             let singles = rows.iter().map(|r| rate(r.successes, r.episodes)).collect();
             let interval = wilson_95(successes, episodes);
             (episodes > 0).then(|| Point { x, value: rate(successes, episodes), interval, singles })
         });
-        Series { name: name.into(), points: points.collect() }
+        Series { name: name.into(), look, points: points.collect(), dense: false }
     };
     let panels = PANELS.iter().filter(|(features, _)| rows.iter().any(|r| r.labels[1] == *features)).map(|(features, title)| {
-        let series = METHODS.iter().map(|(method, name)| series(features, method, name));
+        let series = (0..METHODS.len()).map(|look| series(features, look));
         Panel { title: (*title).into(), series: series.collect() }
     });
     let chart = Chart {
+        id: "few-demos".into(),
         title: "Stack: success over the number of demos".into(),
+        description: "Curves of success of BC, SC and HIL over the number of demos, a panel for each choice of inputs".into(),
         x_label: "demos".into(),
         y_label: "success".into(),
         note: "lines: all seeds, with Wilson 95 % intervals; dots: single seeds".into(),
-        x_ticks: demos.clone(),
+        x: Axis::Categories(demos.clone()),
+        percent: true,
         panels: panels.collect(),
     };
-    atomic::write_bytes(&args.picture, chart.to_svg().as_bytes())?;
+    atomic::write_bytes(&args.picture, chart.draw().to_svg().as_bytes())?;
     eprintln!("wrote {}", args.picture.display());
     Ok(())
 }

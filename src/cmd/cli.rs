@@ -2,10 +2,11 @@
 
 use super::console::Console;
 use super::context::{Context, Outcome};
-use super::{convert, evaluate, experiment, inspect, plan, pretrain, render, settings, simulate, train};
+use super::{convert, evaluate, experiment, inspect, plan, pretrain, render, report, settings, simulate, train};
 use crate::error::{Error, Result};
 use crate::interrupt::Interrupt;
 use clap::{Parser, Subcommand};
+use rustix::time::{ClockId, clock_gettime};
 use std::path::PathBuf;
 use std::time::Instant;
 
@@ -50,6 +51,7 @@ enum Command {
     Render(render::Args),
     Settings(settings::Args),
     Experiment(experiment::Args),
+    Report(report::Args),
 }
 
 impl Cli {
@@ -74,11 +76,13 @@ impl Cli {
             Command::Train(args) => train::run(args, &context),
             Command::Evaluate(args) => evaluate::run(args, &context),
             Command::Experiment(args) => experiment::run(args, &context),
+            Command::Report(args) => report::run(args, &context),
             Command::Inspect(args) => return inspect::run(args, &context),
             Command::Render(args) => render::run(args, &context),
             Command::Settings(args) => return settings::run(args, &context),
         };
         if outcome.is_ok() {
+            context.console.say(&format!("processor time {:.1} s", processor_s()));
             context.console.say(&format!("wall time {:.1} s", started.elapsed().as_secs_f64()));
         }
         match outcome {
@@ -86,6 +90,12 @@ impl Cli {
             other => other,
         }
     }
+}
+
+/// What all threads of the process have taken so far \[s\].
+fn processor_s() -> f64 {
+    let taken = clock_gettime(ClockId::ProcessCPUTime);
+    taken.tv_sec as f64 + taken.tv_nsec as f64 * 1e-9
 }
 
 #[cfg(test)]

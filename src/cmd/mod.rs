@@ -16,6 +16,7 @@ mod places;
 mod plan;
 mod pretrain;
 mod render;
+mod report;
 mod settings;
 mod shard;
 mod simulate;

@@ -6,6 +6,7 @@ use crate::data::peek::{Format, Peeked, peek};
 use crate::data::{dataset, recording};
 use crate::error::{Error, Result};
 use crate::interrupt;
+use crate::report::experiments;
 use std::ffi::OsStr;
 use std::fs;
 use std::os::unix::fs::MetadataExt;
@@ -28,6 +29,8 @@ pub enum Content {
     Recordings(&'static str),
     /// A directory with the two datasets.
     Datasets,
+    /// A directory with a page, figures and tables.
+    Report,
     /// A directory of finished pieces, in which other runs may have theirs: nothing in it is replaced.
     Pieces,
     /// What the command reads as well, and replaces on purpose.
@@ -90,6 +93,7 @@ impl Places {
             match content {
                 Content::Recordings(_) => atomic::check_directory(path, recording::is_file)?,
                 Content::Datasets => atomic::check_directory(path, dataset::is_file)?,
+                Content::Report => atomic::check_directory(path, experiments::is_file)?,
                 Content::Pieces => atomic::check_place(&path.join("a piece"))?,
                 _ => atomic::check_place(path)?,
             }
@@ -163,7 +167,7 @@ fn check_ending(name: &str, path: &Path, content: Content) -> Result<()> {
         Content::Png => ("png", "a PNG picture"),
         Content::Gif => ("gif", "a GIF animation"),
         Content::Log => ("log", "a log"),
-        Content::Recordings(_) | Content::Datasets | Content::Pieces | Content::Own => return Ok(()),
+        Content::Recordings(_) | Content::Datasets | Content::Report | Content::Pieces | Content::Own => return Ok(()),
     };
     if matches!(atomic::target(path)?, Target::Stream(_)) || path.extension() == Some(OsStr::new(ending)) {
         return Ok(());
@@ -182,7 +186,7 @@ fn check_held(name: &str, path: &Path, content: Content) -> Result<()> {
         Content::Summary(stage) => (Format::Json, Some(stage), None),
         Content::Png => (Format::Png, None, None),
         Content::Gif => (Format::Gif, None, None),
-        Content::Log | Content::Datasets | Content::Pieces | Content::Own => return Ok(()),
+        Content::Log | Content::Datasets | Content::Report | Content::Pieces | Content::Own => return Ok(()),
         Content::Recordings(stage) => return check_recordings(name, path, stage),
     };
     if is_stream(path) || !path.is_file() {

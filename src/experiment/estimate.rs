@@ -32,8 +32,9 @@ const HIL_BATCH: f64 = 8.0;
 const PPO_STEP_S: f64 = 20.8 / 102_400.0;
 /// Of one episode of an evaluation: 11.3 s for 500 \[s\].
 const EVALUATE_S: f64 = 11.3 / 500.0;
-/// Line of a log that a stage ends with.
+/// Lines of a log that a stage ends with.
 const WALL: &str = "wall time ";
+const PROCESSOR: &str = "processor time ";
 
 /// Processor time of a step by the rates \[s\].
 pub fn cost_s(stage: Stage, pipeline: &Pipeline, method: Option<MethodName>) -> f64 {
@@ -74,8 +75,17 @@ fn updates(pipeline: &Pipeline, demos: f64, method: Option<MethodName>) -> f64 {
 
 /// The wall time that a log ends with \[s\].
 pub fn wall_s_of(log: &Path) -> Option<f64> {
+    seconds_of(log, WALL)
+}
+
+/// The processor time that a log ends with \[s\].
+pub fn processor_s_of(log: &Path) -> Option<f64> {
+    seconds_of(log, PROCESSOR)
+}
+
+fn seconds_of(log: &Path, what: &str) -> Option<f64> {
     let text = fs::read_to_string(log).ok()?;
-    let last = text.lines().rev().find_map(|line| line.strip_prefix(WALL))?;
+    let last = text.lines().rev().find_map(|line| line.strip_prefix(what))?;
     last.strip_suffix(" s")?.parse().ok()
 }
 

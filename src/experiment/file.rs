@@ -1,5 +1,6 @@
 //! An experiment's file, checked: `pipelines/experiments/NAME.toml`.
 
+use super::report_kind::ReportKind;
 use super::seeds::Seeds;
 use super::spec::{Experiment, Overrides};
 use super::variation::{self, Raw as RawVariation};
@@ -17,13 +18,30 @@ pub const DIRECTORY: &str = "pipelines/experiments";
 /// A file with every key has a few kB \[bytes\].
 const LONGEST_FILE: u64 = 1 << 20;
 /// Keys of an experiment.
-const KEYS: [&str; 10] =
-    ["description", "tasks", "presets", "methods", "seeds", "episodes", "set", "dataset", "record", "variation"];
+const KEYS: [&str; 13] = [
+    "description",
+    "notes",
+    "report",
+    "reference",
+    "tasks",
+    "presets",
+    "methods",
+    "seeds",
+    "episodes",
+    "set",
+    "dataset",
+    "record",
+    "variation",
+];
 
 #[derive(Deserialize)]
 struct Raw {
     #[serde(default)]
     description: String,
+    #[serde(default)]
+    notes: String,
+    report: Option<String>,
+    reference: Option<String>,
     tasks: Vec<String>,
     #[serde(default)]
     presets: Option<Vec<String>>,
@@ -39,6 +57,12 @@ struct Raw {
     variation: Vec<RawVariation>,
 }
 
+/// Names of the experiments in `pipelines/experiments`.
+pub fn all() -> BTreeSet<String> {
+    let entries = fs::read_dir(DIRECTORY).into_iter().flatten().flatten();
+    entries.filter_map(|entry| Some(entry.file_name().to_str()?.strip_suffix(".toml")?.to_string())).collect()
+}
+
 /// The file of an experiment: the path of a `.toml` file, or the name of one in `pipelines/experiments`.
 ///
 /// # Errors
@@ -51,12 +75,7 @@ pub fn find(name: &str) -> Result<PathBuf> {
     if is_name(name) && path.is_file() {
         return Ok(path);
     }
-    let known: BTreeSet<String> = fs::read_dir(DIRECTORY)
-        .into_iter()
-        .flatten()
-        .flatten()
-        .filter_map(|entry| Some(entry.file_name().to_str()?.strip_suffix(".toml")?.to_string()))
-        .collect();
+    let known = all();
     if known.is_empty() {
         let message =
             format!("no experiment \"{}\": there is no {DIRECTORY} here; name a file, for example mine.toml", shown(name));
@@ -110,6 +129,9 @@ fn of_text(name: &str, path: &Path, text: &str, overrides: &Overrides) -> std::r
         name: name.into(),
         path: path.into(),
         description: raw.description,
+        notes: raw.notes,
+        report: raw.report.map_or(Ok(ReportKind::default()), |word| word.parse())?,
+        reference: raw.reference,
         tasks: parsed(&raw.tasks)?,
         methods: parsed(&raw.methods)?,
         presets,
@@ -132,6 +154,11 @@ fn of_text(name: &str, path: &Path, text: &str, overrides: &Overrides) -> std::r
         let checked = variation.check(&experiment).map_err(|why| format!("variation \"{}\": {why}", shown(&variation.name)))?;
         experiment.variations.push(checked);
     }
-    distinct("variations", &raw.variation.iter().map(|v| v.name.clone()).collect::<Vec<_>>())?;
+    let names: Vec<String> = raw.variation.iter().map(|v| v.name.clone()).collect();
+    distinct("variations", &names)?;
+    if let Some(reference) = experiment.reference.as_ref().filter(|reference| !names.contains(reference)) {
+        let known: Vec<&str> = names.iter().map(String::as_str).collect();
+        return Err(format!("reference: {}", unknown("variation", reference, &known)));
+    }
     Ok(experiment)
 }

@@ -34,6 +34,8 @@ pub struct Row<'a> {
     pub summary: Summary,
     /// Updates of the policy, warm start included.
     pub updates: u64,
+    /// What was known after each epoch of its training.
+    pub metrics: Table,
 }
 
 /// The finished runs of a grid.
@@ -50,9 +52,10 @@ fn row<'a>(run: &'a Run, train: &Step, evaluate: &Step) -> Result<Row<'a>> {
     let summary = serde_json::from_value(content);
     let summary: Summary =
         summary.map_err(|e| Error::input(evaluate.artefact(), format!("is no summary of an evaluation: {e}")))?;
-    let metrics = &train.outputs[1].path;
-    let updates = updates(&table_file::read(metrics)?.0);
-    Ok(Row { run, summary, updates: updates.ok_or_else(|| Error::input(metrics, "counts no updates; train again"))? })
+    let path = &train.outputs[1].path;
+    let metrics = table_file::read(path)?.0;
+    let updates = updates(&metrics).ok_or_else(|| Error::input(path, "counts no updates; train again"))?;
+    Ok(Row { run, summary, updates, metrics })
 }
 
 /// Updates of all stages of a training, by its metrics: each stage counts from 1, so the last of each. `None` for another table.
@@ -68,7 +71,7 @@ pub fn updates(metrics: &Table) -> Option<u64> {
 /// The results as CSV.
 pub fn to_csv(rows: &[Row], grid: &Grid) -> String {
     let mut text = header();
-    for Row { run, summary, updates } in rows {
+    for Row { run, summary, updates, .. } in rows {
         let (task, preset, variation, method, seed) = (run.task, &run.preset, &run.variation, run.method.name(), run.seed);
         let Summary { episodes, successes, success_rate, wilson_95: [low, high], failures, .. } = summary;
         let classes = FailureClass::ALL.map(|class| failures.get(class.name()).copied().unwrap_or(0).to_string()).join(",");

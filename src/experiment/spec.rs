@@ -1,5 +1,6 @@
 //! What an experiment is.
 
+use super::report_kind::ReportKind;
 use crate::config::Stage;
 use crate::learn::MethodName;
 use crate::task::Task;
@@ -14,6 +15,12 @@ pub struct Experiment {
     pub path: PathBuf,
     /// What it is for.
     pub description: String,
+    /// What there is to say of its results: plain paragraphs, `code` in backticks.
+    pub notes: String,
+    /// What a report shows of it.
+    pub report: ReportKind,
+    /// The variation that a report compares the others with.
+    pub reference: Option<String>,
     /// Tasks.
     pub tasks: Vec<Task>,
     /// Presets: those that come with hilt, or directories below `pipelines` with a file a task.
@@ -48,6 +55,8 @@ pub struct Overrides {
 pub struct Variation {
     /// Its name, a directory's.
     pub name: String,
+    /// The earlier variation whose settings it begins with.
+    pub extends: Option<String>,
     /// Settings, over all others.
     pub set: Vec<String>,
     /// Stages that they hold for.

@@ -3,7 +3,7 @@
 use super::emit::{self, Site};
 use super::estimate::{Estimate, in_words};
 use super::state::{State, states};
-use super::{Experiment, Grid, Overrides, seeds_of};
+use super::{Experiment, Grid, Overrides, ReportKind, seeds_of};
 use crate::config::Stage;
 use crate::error::Error;
 use std::collections::BTreeSet;
@@ -128,6 +128,17 @@ fn an_extended_variation_has_the_settings_of_the_one_before() {
     let wrong = text.replace("extends = \"rho-0.6\"", "extends = \"rho\"");
     let said = Experiment::parse(Path::new("some.toml"), &wrong, &Overrides::default()).expect_err("refused").to_string();
     assert!(said.contains("unknown variation \"rho\"; allowed: plain, rho-0.6, calm, turned"), "{said}");
+}
+
+#[test]
+fn a_file_says_what_a_report_shows_and_names_what_is_there() {
+    let with = |lines: &str| Experiment::parse(Path::new("some.toml"), &format!("{lines}\n{TEXT}"), &Overrides::default());
+    assert_eq!(experiment(TEXT).report, ReportKind::Success);
+    let ladder = with("report = \"ladder\"\nreference = \"calm\"\nnotes = \"why\"").expect("an experiment");
+    assert_eq!((ladder.report, ladder.reference.as_deref(), ladder.notes.as_str()), (ReportKind::Ladder, Some("calm"), "why"));
+    let refused = |lines: &str| with(lines).expect_err("refused").to_string();
+    assert!(refused("report = \"tabel3\"").contains("unknown report \"tabel3\"; did you mean table3?"));
+    assert!(refused("reference = \"plane\"").contains("reference: unknown variation \"plane\"; did you mean plain?"));
 }
 
 #[test]

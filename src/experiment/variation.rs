@@ -53,7 +53,7 @@ impl Raw {
             None => Vec::new(),
         };
         set.extend(self.set.iter().cloned());
-        Ok(Variation { name: self.name.clone(), set, stages, tasks, methods })
+        Ok(Variation { name: self.name.clone(), extends: self.extends.clone(), set, stages, tasks, methods })
     }
 }
 

@@ -1,5 +1,9 @@
-//! Reports for people: pictures of episodes, charts, and tables on a terminal.
+//! Reports for people: pictures of episodes, charts, statistics over seeds, tables on a terminal, and pages of finished experiments.
 
 pub mod chart;
+pub mod experiments;
+pub mod page;
+pub mod paper;
 pub mod render;
+pub mod statistics;
 pub mod table;

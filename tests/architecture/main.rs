@@ -28,8 +28,8 @@ const FLOW: [(&str, &[&str]); 19] = [
     ("data", &["config", "demo", "robot", "scene", "state", "task", "tasks"]),
     ("learn", &["config", "demo", "env", "nn", "pulse", "robot", "state", "task", "tasks"]),
     ("eval", &["config", "demo", "learn", "scene", "sim", "state", "task", "tasks"]),
-    ("report", &["data", "demo", "robot", "scene", "state", "task", "tasks"]),
     ("experiment", &["config", "data", "eval", "learn", "plan", "task", "tasks"]),
+    ("report", &["config", "data", "demo", "eval", "experiment", "learn", "robot", "scene", "state", "task", "tasks"]),
     (
         "cmd",
         &[

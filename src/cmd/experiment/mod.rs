@@ -16,7 +16,7 @@ use checked::Checked;
 use std::path::Path;
 
 /// Where experiments go unless a flag says otherwise.
-const EXPERIMENTS: &str = "runs/experiments";
+pub const EXPERIMENTS: &str = "runs/experiments";
 /// A step gains little from more threads than these, a machine much from steps side by side.
 const THREADS_OF_A_STEP: usize = 2;
 

@@ -42,6 +42,14 @@ pub fn provenance(root: &Path) -> Result<Provenance> {
     check::info(root).map(|info| info.provenance)
 }
 
+/// Steps of all episodes of a dataset, as its description counts them.
+///
+/// # Errors
+/// As [`provenance`].
+pub fn frames(root: &Path) -> Result<usize> {
+    check::info(root).map(|info| info.frames)
+}
+
 /// Writes one dataset; an older one there is replaced when the new one is whole.
 ///
 /// # Errors

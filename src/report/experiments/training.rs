@@ -1,0 +1,231 @@
+//! The paper's Figure 7: success over epochs, environment steps and time, a curve a method. Each point is trainings of one length, run to their
+//! end and evaluated, so a curve is not one training watched on its way.
+
+use super::curves::numbers;
+use super::finished::{Arm, Finished, Measured};
+use super::words::{minutes, percent_within};
+use crate::data::dataset::{self, TRAIN, VALIDATION};
+use crate::error::Result;
+use crate::report::chart::{Axis, Chart, Panel, Point, Series};
+use crate::report::page::{Block, Cell, Column, Table};
+use crate::report::statistics::Estimate;
+use crate::task::Task;
+
+/// Column of the metrics of a method that acts in the simulator: control steps so far.
+const ENV_STEPS: &str = "env_steps";
+
+/// What time is measured by: the processor's, unless a log of an older version has wall time alone.
+#[derive(Clone, Copy)]
+enum Clock {
+    Processor,
+    Wall,
+}
+
+impl Clock {
+    fn of(finished: &Finished) -> Self {
+        if finished.runs.iter().all(|m| m.train_processor_s.is_some()) { Clock::Processor } else { Clock::Wall }
+    }
+
+    fn name(self) -> &'static str {
+        ["processor time", "wall time"][self as usize]
+    }
+
+    fn read(self) -> fn(&Measured) -> Option<f64> {
+        match self {
+            Clock::Processor => |m| m.train_processor_s,
+            Clock::Wall => |m| m.train_s,
+        }
+    }
+}
+
+/// A length of training of one method.
+struct Length<'a> {
+    arm: Arm<'a>,
+    task: Task,
+    epochs: f64,
+    env_steps: f64,
+    train_s: Option<f64>,
+    success: Estimate,
+    singles: Vec<f64>,
+}
+
+/// Three figures and the table of plateaus.
+///
+/// # Errors
+/// What reading the descriptions of datasets returns.
+pub fn blocks(finished: &Finished) -> Result<Vec<Block>> {
+    let lengths = lengths(finished)?;
+    let figure = |name: &str, title: &str, label: &str, axis: Axis, x: &dyn Fn(&Length) -> Option<f64>, caption: &str| {
+        let chart = chart(finished, &lengths, (name, title, label, axis), x);
+        Block::Figure(chart.draw(), format!("{caption} {}", super::common::intervals(finished)))
+    };
+    let mut blocks = vec![figure(
+        "epochs",
+        "Success over training epochs",
+        "epochs, warm start included",
+        Axis::Log,
+        &|l| Some(l.epochs),
+        "Success over the number of epochs: the paper's Figure 7. Each point is trainings of that length, run to their end.",
+    )];
+    blocks.push(figure(
+        "env-steps",
+        "Success over steps in the environment",
+        "control steps, demos included",
+        Axis::Log,
+        &|l| Some(l.env_steps),
+        "Success over all control steps that were executed for it: those of the demos, and those that a method takes itself. Imitation takes none, \
+         so all its lengths of training stand above each other.",
+    ));
+    let clock = Clock::of(finished);
+    if lengths.iter().all(|l| l.train_s.is_some()) {
+        let caption = format!("Success over the {} of `hilt train`, mean over seeds, on the machine of the runs.", clock.name());
+        let title = format!("Success over {} of training", clock.name());
+        blocks.push(figure("time", &title, "minutes of training", Axis::Log, &|l| l.train_s.map(|s| s / 60.0), &caption));
+    } else {
+        blocks.push(Block::Words("Logs of trainings are missing, so there is no figure over time.".into()));
+    }
+    blocks.push(Block::Table(plateaus(finished, &lengths, clock)));
+    Ok(blocks)
+}
+
+/// Every arm and task, by method, task and length.
+fn lengths(finished: &Finished) -> Result<Vec<Length<'_>>> {
+    let (mut all, clock) = (Vec::new(), Clock::of(finished).read());
+    for arm in finished.arms() {
+        for task in finished.tasks() {
+            let runs: Vec<&Measured> = finished.of(arm, task).collect();
+            let Some(success) = finished.success(arm, task) else { continue };
+            let steps = runs.iter().map(|m| env_steps(finished, m)).collect::<Result<Vec<f64>>>()?;
+            let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len() as f64;
+            let epochs: Vec<f64> = runs.iter().map(|m| m.metrics.rows() as f64).collect();
+            let singles = runs.iter().map(|m| m.summary.success_rate).collect();
+            let (epochs, env_steps, train_s) = (mean(&epochs), mean(&steps), finished.train_s(arm, task, clock));
+            all.push(Length { arm, task, epochs, env_steps, train_s, success, singles });
+        }
+    }
+    all.sort_by(|a, b| a.epochs.total_cmp(&b.epochs));
+    Ok(all)
+}
+
+/// Control steps of the demos of a run and of its own acting.
+fn env_steps(finished: &Finished, measured: &Measured) -> Result<f64> {
+    let own = numbers(&measured.metrics, ENV_STEPS).and_then(|column| column.last().copied()).unwrap_or(0.0);
+    let inputs = &finished.grid.steps[measured.run.train].inputs;
+    let mut steps = own;
+    for input in inputs.iter().filter(|input| input.role == "dataset") {
+        for part in [TRAIN, VALIDATION] {
+            steps += dataset::frames(&input.path.join(part))? as f64;
+        }
+    }
+    Ok(steps)
+}
+
+fn chart(finished: &Finished, lengths: &[Length], about: (&str, &str, &str, Axis), x: &dyn Fn(&Length) -> Option<f64>) -> Chart {
+    let (name, title, x_label, axis) = about;
+    let experiment = &finished.experiment;
+    let mut panels = Vec::new();
+    for preset in &experiment.presets {
+        for task in finished.tasks() {
+            let series = experiment.methods.iter().map(|method| {
+                let of = lengths.iter().filter(|l| (l.arm.preset, l.arm.method, l.task) == (preset, *method, task));
+                let look = of.clone().next().map_or(0, |l| l.arm.look());
+                let point = |l: &Length| {
+                    Some(Point { x: x(l)?, value: l.success.value, interval: l.success.interval, singles: l.singles.clone() })
+                };
+                Series { name: method.name().into(), look, points: of.filter_map(point).collect(), dense: false }
+            });
+            let series: Vec<Series> = series.filter(|series| !series.points.is_empty()).collect();
+            let title = if experiment.presets.len() > 1 { format!("{task} ({preset})") } else { task.to_string() };
+            if !series.is_empty() {
+                panels.push(Panel { title, series });
+            }
+        }
+    }
+    Chart {
+        id: format!("{}-{name}", experiment.name),
+        title: title.into(),
+        description: format!("{title}, a curve for each method and a panel for each task"),
+        x_label: x_label.into(),
+        y_label: "success".into(),
+        note: "markers: mean over seeds, with 95 % intervals; dots: single seeds".into(),
+        x: axis,
+        percent: true,
+        panels,
+    }
+}
+
+/// The longest training of each method and preset: what methods are compared at.
+pub fn longest(finished: &Finished) -> Vec<Arm<'_>> {
+    let rows = |arm: Arm| finished.runs.iter().filter(|m| Arm::of(&m.run) == arm).map(|m| m.metrics.rows()).max().unwrap_or(0);
+    finished.arms().into_iter().fold(Vec::new(), |mut longest: Vec<Arm>, arm| {
+        match longest.iter_mut().find(|known| (known.preset, known.method) == (arm.preset, arm.method)) {
+            Some(known) if rows(*known) < rows(arm) => *known = arm,
+            Some(_) => {}
+            None => longest.push(arm),
+        }
+        longest
+    })
+}
+
+/// The shortest of lengths in order, from which on every mean lies within or above the interval of the longest; `None` where that reaches down to 0.
+fn plateau(successes: &[Estimate]) -> Option<usize> {
+    let enough = successes.last().map(|last| last.interval[0]).filter(|low| *low > 0.0)?;
+    let below = successes.iter().rposition(|success| success.value < enough);
+    Some(below.map_or(0, |at| at + 1).min(successes.len() - 1))
+}
+
+fn plateaus(finished: &Finished, lengths: &[Length], clock: Clock) -> Table {
+    let experiment = &finished.experiment;
+    let mut rows = Vec::new();
+    for preset in &experiment.presets {
+        for task in finished.tasks() {
+            for method in &experiment.methods {
+                let of = lengths.iter().filter(|l| (l.arm.preset, l.arm.method, l.task) == (preset, *method, task));
+                let of: Vec<&Length> = of.collect();
+                let successes: Vec<Estimate> = of.iter().map(|l| l.success).collect();
+                if let Some(last) = of.last() {
+                    let name =
+                        if experiment.presets.len() > 1 { format!("{} ({preset})", method.name()) } else { method.name().into() };
+                    let cells_of =
+                        |l: &Length| [format!("{:.0}", l.epochs).into(), minutes(l.train_s), percent_within(l.success).into()];
+                    let mut cells = vec![Cell::from(name), task.name().into()];
+                    cells.extend(plateau(&successes).map_or(["–", "–", "–"].map(Cell::from), |at| cells_of(of[at])));
+                    cells.extend(cells_of(last));
+                    rows.push(cells);
+                }
+            }
+        }
+    }
+    let of = |group: &str, name: &str| Column::of(group, name);
+    let columns = vec![
+        Column::words(""),
+        Column::words("task"),
+        of("at the plateau", "epochs"),
+        of("at the plateau", "minutes"),
+        of("at the plateau", "success, %"),
+        of("longest training", "epochs"),
+        of("longest training", "minutes"),
+        of("longest training", "success, %"),
+    ];
+    let caption = format!(
+        "Time to plateau: the shortest training from which on mean success never again lies below the interval of the longest training; a dash \
+         where that interval reaches down to 0. Where it is the longest training itself, success may still be rising. Minutes: {}.",
+        clock.name()
+    );
+    Table { caption, columns, rows }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_plateau_begins_where_success_stays_within_the_interval_of_the_last() {
+        let of =
+            |values: &[f64]| values.iter().map(|v| Estimate { value: *v, interval: [v - 0.05, v + 0.05] }).collect::<Vec<_>>();
+        assert_eq!(plateau(&of(&[0.1, 0.87, 0.5, 0.86, 0.9])), Some(3));
+        assert_eq!(plateau(&of(&[0.95, 0.9])), Some(0));
+        assert_eq!(plateau(&of(&[0.1, 0.9])), Some(1));
+        assert_eq!((plateau(&[]), plateau(&of(&[0.0, 0.04]))), (None, None));
+    }
+}
