@@ -36,6 +36,7 @@ const FLOW: [(&str, &[&str]); 19] = [
             "config",
             "data",
             "demo",
+            "env",
             "eval",
             "experiment",
             "learn",

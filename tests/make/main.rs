@@ -15,7 +15,8 @@ use tempfile::TempDir;
 
 /// Settings of a run that takes a second.
 pub const TINY: &str = "plan.episodes=4 pretrain.epochs=2 pretrain.hidden_units=16 train.hidden_units=16 \
-    train.warm_start_updates=10 train.epochs=1 train.min_updates=0 evaluate.episodes=2 evaluate.horizon_steps=40";
+    train.warm_start_updates=10 train.epochs=1 train.min_updates=0 train.ppo.total_steps=200 train.ppo.worlds=8 train.ppo.steps=10 \
+    evaluate.episodes=2 evaluate.horizon_steps=40";
 /// Every stage.
 pub const ALL: [&str; 6] = ["plan", "simulate", "convert", "pretrain", "train", "evaluate"];
 /// Variables that would change what is tested, from the person's shell or from the `make` that runs the tests.

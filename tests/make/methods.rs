@@ -7,7 +7,7 @@ use std::fs;
 fn another_method_gets_a_policy_of_its_own() {
     let run = Run::finished();
     let before = run.contents();
-    for method in ["bc", "sc"] {
+    for method in ["bc", "sc", "ppo", "bc-rl"] {
         let word = format!("METHOD={method}");
         assert_eq!(run.all(&[&word]), ALL[4..], "{method}");
         let output = run.make(&[&word]);
