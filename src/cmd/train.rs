@@ -87,7 +87,8 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome> {
     announce(console, args.resume, resume.as_ref(), &kept);
     let mut keeper = Keeper::new(&kept, &provenance, console, resume.as_ref());
     let settings = &pipeline.train;
-    let world = |horizon_steps| -> Result<Box<dyn Env>> { Ok(Box::new(TaskEnv::new(&pipeline, horizon_steps, seed))) };
+    let reward = if args.method == MethodName::BcRl { settings.bc_rl.reward } else { settings.ppo.reward };
+    let world = |horizon_steps| -> Result<Box<dyn Env>> { Ok(Box::new(TaskEnv::new(&pipeline, reward, horizon_steps, seed))) };
     let learner: Box<dyn Method> = match demos {
         None => Box::new(Ppo::new(pipeline.task, settings, seed, world)?),
         Some(inputs) if args.method == MethodName::BcRl => Box::new(BcRl::new(inputs, settings, seed, world)?),

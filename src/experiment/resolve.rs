@@ -55,7 +55,7 @@ const NOT_OF_PPO: [&str; 22] = [
     "train.bc_rl.",
 ];
 /// Keys without effect on behavior cloning that goes on with reinforcement learning: `[train.bc_rl]` says which of PPO's.
-const NOT_OF_BC_RL: [&str; 11] = [
+const NOT_OF_BC_RL: [&str; 12] = [
     "pretrain.",
     "train.alpha",
     "train.rho",
@@ -63,6 +63,7 @@ const NOT_OF_BC_RL: [&str; 11] = [
     "train.fine_tune_dynamics",
     "train.dynamics_",
     "train.ppo.action_unit",
+    "train.ppo.reward",
     "train.ppo.initial_std",
     "train.ppo.horizon_steps",
     "train.ppo.learning_rate",

@@ -35,16 +35,15 @@ struct Running {
 }
 
 impl TaskEnv {
-    /// As `[scene]`, `[simulate]` and `[train.ppo]` have it; episodes are cut off after `horizon_steps`.
-    pub fn new(pipeline: &Pipeline, horizon_steps: u32, seed: u64) -> Self {
-        let ppo = &pipeline.train.ppo;
+    /// As `[scene]`, `[simulate]` and gamma of `[train.ppo]` have it; episodes are cut off after `horizon_steps`.
+    pub fn new(pipeline: &Pipeline, reward: RewardKind, horizon_steps: u32, seed: u64) -> Self {
         let pulses = PulseSettings { probability: 0.0, ..pipeline.simulate.pulses.clone() };
         TaskEnv {
             task: pipeline.task,
             scene: pipeline.scene.clone(),
             noise: SimulateSettings { pulses, ..pipeline.simulate.clone() },
-            reward: ppo.reward,
-            gamma: ppo.gamma,
+            reward,
+            gamma: pipeline.train.ppo.gamma,
             horizon_steps,
             seed,
             running: None,
@@ -122,7 +121,7 @@ mod tests {
     fn env(change: impl Fn(&mut Pipeline)) -> TaskEnv {
         let mut pipeline = Pipeline::defaults(Task::PickUp);
         change(&mut pipeline);
-        TaskEnv::new(&pipeline, pipeline.train.ppo.horizon_steps, 11)
+        TaskEnv::new(&pipeline, pipeline.train.ppo.reward, pipeline.train.ppo.horizon_steps, 11)
     }
 
     fn begin(env: &mut TaskEnv, episode: u64) -> Vec<f32> {
