@@ -52,7 +52,7 @@ fn wrong_usage_ends_with_two() {
     says(&["plan"], 2, &["--task", "pick-up, pick-and-place, stack"]);
     says(&["plan", "--task", "juggle"], 2, &["unknown task \"juggle\"", "pick-up, pick-and-place, stack"]);
     says(&["fly"], 2, &["unrecognized subcommand 'fly'"]);
-    says(&["plan", "--task", "stack", "--preset", "worst"], 2, &["unknown preset \"worst\"", "best, paper"]);
+    says(&["plan", "--task", "stack", "--preset", "worst"], 2, &["unknown preset \"worst\"", "best, mended, paper"]);
     says(&["plan", "--task", "stack", "--threads", "0"], 2, &["--threads"]);
     says(&["train", "--task", "stack", "--method", "magic"], 2, &["magic", "hil"]);
     says(&["render", "a.mcap"], 2, &["--gif", "--png"]);
