@@ -20,8 +20,8 @@ pub struct SettingsArgs {
     /// Pipeline file with the settings of every stage [default: the one of the task that comes with hilt]
     #[arg(long, value_name = "FILE")]
     pipeline: Option<PathBuf>,
-    /// Settings that come with hilt: best (every documented mend), paper (as literal as can work) or mended (the
-    /// fewest mends of it that reach its figures) [default: best]
+    /// Settings that come with hilt: best (every documented mend), paper (as literal as can work) or mended (paper
+    /// with the mends that lift hil above bc) [default: best]
     #[arg(long, value_name = "PRESET", conflicts_with = "pipeline")]
     preset: Option<Preset>,
     /// Override one setting, in TOML; may be repeated (--set plan.speed=0.5 --set scene.yaw=true)

@@ -10,7 +10,7 @@ pub enum Preset {
     /// The method with every documented mend switched on.
     #[default]
     Best,
-    /// As literal as can work, and the fewest mends with which the method reaches the paper's figures.
+    /// As literal as can work, and the mends that lift hybrid imitation learning above behavior cloning; docs/notes.md says how far that was shown.
     Mended,
     /// As literal as can work.
     Paper,

@@ -1,6 +1,6 @@
 //! Line charts: values over an axis with intervals and single observations, in panels side by side.
 
-use super::picture::{Picture, color, escaped, legend, marker, names_at, stroke, text, width_of};
+use super::picture::{Picture, color, escaped, legend, marker, names_at, stroke, text, width_of, width_with};
 use super::scale::{Axis, Scale, up_to_one};
 use std::fmt::Write;
 
@@ -109,7 +109,7 @@ impl Chart {
         }
         svg += &text(LEFT, height - 14.0, "start", "chart-small", &self.note);
         let Chart { id, title, description, .. } = self.clone();
-        Picture { id, title, description, size: [width, height], body: svg }
+        Picture { id, title, description, size: [width_with(&self.title, LEFT, width), height], body: svg }
     }
 
     /// Right of each panel.

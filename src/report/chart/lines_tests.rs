@@ -64,3 +64,11 @@ fn a_dense_line_has_a_band_and_few_markers_and_leaves_out_what_the_axis_cannot_h
     assert_eq!((svg.matches("class=\"band\"").count(), svg.matches("class=\"mean\"").count()), (1, 6));
     assert!(!svg.contains("NaN") && !svg.contains("inf") && !svg.contains("xmlns"), "{svg}");
 }
+
+#[test]
+fn a_long_title_widens_the_picture() {
+    let mut chart = chart();
+    let narrow = chart.draw().size;
+    chart.title = "w".repeat(200);
+    assert_eq!(chart.draw().size, [200.0 * 8.4 + 2.0 * LEFT, narrow[1]]);
+}

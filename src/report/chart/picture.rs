@@ -11,6 +11,8 @@ const DASHES: [&str; LOOKS] = ["none", "6 4", "2 3", "10 3 2 3", "14 4", "1 5"];
 const MARKER: f64 = 4.5;
 /// An average letter of a label \[pixels\].
 const LETTER: f64 = 6.8;
+/// An average letter of a chart's title \[pixels\].
+const TITLE_LETTER: f64 = 8.4;
 /// Names at the ends of lines stand this far apart at least \[pixels\].
 const LINE: f64 = 14.0;
 /// What a legend's entry has beside its letters \[pixels\].
@@ -112,6 +114,11 @@ pub(super) fn names_at(x: f64, mut names: Vec<(f64, &str)>, bottom: f64) -> Stri
         lowest = name.0 - LINE;
     }
     names.iter().map(|(y, name)| text(x, y + 4.0, "start", "chart-small", name)).collect()
+}
+
+/// A picture's width that holds its title, which begins at `left`, too.
+pub(super) fn width_with(title: &str, left: f64, width: f64) -> f64 {
+    width.max(2.0 * left + TITLE_LETTER * title.chars().count() as f64)
 }
 
 /// About how wide a label is \[pixels\].

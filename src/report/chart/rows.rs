@@ -1,6 +1,6 @@
 //! Values beside names: a row a name, panels side by side, in each the same rows with values, intervals and single observations from left to right.
 
-use super::picture::{Picture, color, legend, marker, text, width_of};
+use super::picture::{Picture, color, legend, marker, text, width_of, width_with};
 use std::fmt::Write;
 
 /// A figure of shares between 0 and 1.
@@ -93,7 +93,7 @@ impl Rows {
         }
         svg += &text(LEFT, height - 14.0, "start", "chart-small", &self.note);
         let Rows { id, title, description, .. } = self.clone();
-        Picture { id, title, description, size: [width, height], body: svg }
+        Picture { id, title, description, size: [width_with(&self.title, LEFT, width), height], body: svg }
     }
 
     /// Looks and names, in the order in which they first come.

@@ -1,6 +1,6 @@
 //! Paths in space, drawn in parallel projection: panels side by side with the same box, so that they compare at sight.
 
-use super::picture::{Picture, color, marker, stroke, text};
+use super::picture::{Picture, color, marker, stroke, text, width_with};
 use crate::math;
 use std::fmt::Write;
 
@@ -80,7 +80,7 @@ impl Space {
         }
         svg += &text(LEFT, size[1] - 14.0, "start", "chart-small", &self.note);
         let Space { id, title, description, .. } = self.clone();
-        Picture { id, title, description, size, body: svg }
+        Picture { id, title, description, size: [width_with(&self.title, LEFT, size[0]), size[1]], body: svg }
     }
 
     /// Low and high ends along x, y and z \[m\], with room for every point.

@@ -4,7 +4,7 @@ use crate::config::{ActionChoice, FingerCloning, Objective, Pairs, StateScale, T
 use crate::learn::models::{Corpus, DT_S, STEP_FLOOR, Scaling};
 use crate::state::{ARM_JOINTS, BASE_DIM, FINGERS, JOINTS};
 
-/// Spread of a state entry below which L_SC counts it as constant under `sc.scale = "state"`.
+/// Spread of a state entry below which L_SC counts it as constant under `train.sc.scale = "state"`.
 const STATE_FLOOR: f32 = 0.01;
 
 /// Share of the commanded motion that a finger may miss and still count as one that follows. Of 77,000 commands above the fingers' dead
