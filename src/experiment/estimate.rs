@@ -5,7 +5,6 @@ use super::state::State;
 use super::step::Step;
 use crate::config::{Pipeline, Stage};
 use crate::learn::MethodName;
-use crate::learn::methods::from_scratch;
 use crate::task::Task;
 use std::collections::BTreeMap;
 use std::fs;
@@ -64,8 +63,7 @@ fn by_rewards(method: Option<MethodName>) -> bool {
 
 /// Updates on demos, counted in those of behavior cloning.
 fn updates(pipeline: &Pipeline, demos: f64, method: Option<MethodName>) -> f64 {
-    let from_scratch = from_scratch(&pipeline.train);
-    let train = if method == Some(MethodName::Sc) { &from_scratch } else { &pipeline.train };
+    let train = method.map_or_else(|| pipeline.train.clone(), |method| method.own_settings(&pipeline.train));
     let per_epoch = (demos / train.batch.max(1) as f64).ceil().max(1.0);
     let of_algorithm_1 = train.epochs_of(per_epoch as u64) as f64 * per_epoch;
     let each =

@@ -21,7 +21,7 @@ mod step;
 mod variation;
 mod wording;
 
-pub use file::{all, find};
+pub use file::{DIRECTORY, all, find};
 pub use report_kind::ReportKind;
 pub use runs::{Grid, Run};
 pub use seeds::{Seeds, seeds_of};

@@ -14,36 +14,18 @@ use std::path::Path;
 
 /// Where presets that do not come with hilt are, a directory each.
 const PIPELINES: &str = "pipelines";
-/// Keys without effect on behavior cloning: what state cloning, the mixture and the dynamics network are set by. A dot or underscore ends a family.
-const NOT_OF_BC: [&str; 8] = [
-    "pretrain.",
-    "train.alpha",
-    "train.rho",
-    "train.sc.",
-    "train.fine_tune_dynamics",
-    "train.dynamics_",
-    "train.ppo.",
-    "train.bc_rl.",
-];
-/// Keys without effect on state cloning alone.
-const NOT_OF_SC: [&str; 4] = ["train.alpha", "train.bc_batch", "train.ppo.", "train.bc_rl."];
-/// Keys without effect on their hybrid.
-const NOT_OF_HIL: [&str; 2] = ["train.ppo.", "train.bc_rl."];
-/// Keys without effect on reinforcement learning, which has its own table beside the network's keys of `[train]`.
-const NOT_OF_PPO: [&str; 22] = [
+// Keys of parts that a method may lack. A dot or underscore ends a family.
+const OF_STATE_CLONING: &[&str] =
+    &["pretrain.", "train.alpha", "train.rho", "train.sc.", "train.fine_tune_dynamics", "train.dynamics_"];
+const OF_REWARDS: &[&str] = &["train.ppo.", "train.bc_rl."];
+const OF_DEMOS: &[&str] = &[
     "plan.",
     "convert.",
-    "pretrain.",
     "train.loss",
     "train.action",
     "train.initial_std",
     "train.d_conv",
     "train.tau",
-    "train.alpha",
-    "train.rho",
-    "train.sc.",
-    "train.fine_tune_dynamics",
-    "train.dynamics_",
     "train.warm_start_",
     "train.bc_batch",
     "train.epochs",
@@ -52,16 +34,9 @@ const NOT_OF_PPO: [&str; 22] = [
     "train.learning_rate",
     "train.clip_norm",
     "train.ema_decay",
-    "train.bc_rl.",
 ];
-/// Keys without effect on behavior cloning that goes on with reinforcement learning: `[train.bc_rl]` says which of PPO's.
-const NOT_OF_BC_RL: [&str; 12] = [
-    "pretrain.",
-    "train.alpha",
-    "train.rho",
-    "train.sc.",
-    "train.fine_tune_dynamics",
-    "train.dynamics_",
+/// Keys of `[train.ppo]` that `[train.bc_rl]` or the demos stand for in behavior cloning that goes on with rewards.
+const OF_PPO_ALONE: &[&str] = &[
     "train.ppo.action_unit",
     "train.ppo.reward",
     "train.ppo.initial_std",
@@ -69,6 +44,18 @@ const NOT_OF_BC_RL: [&str; 12] = [
     "train.ppo.learning_rate",
     "train.ppo.final_learning_rate",
 ];
+
+/// Keys without effect on a method.
+fn not_of(method: MethodName) -> Vec<&'static str> {
+    let parts: &[&[&str]] = match method {
+        MethodName::Hil => &[OF_REWARDS],
+        MethodName::Bc => &[OF_STATE_CLONING, OF_REWARDS],
+        MethodName::Sc => &[&["train.alpha", "train.bc_batch"], OF_REWARDS],
+        MethodName::Ppo => &[OF_DEMOS, OF_STATE_CLONING, &["train.bc_rl."]],
+        MethodName::BcRl => &[OF_STATE_CLONING, OF_PPO_ALONE],
+    };
+    parts.concat()
+}
 
 /// What one stage does in a cell of the grid.
 #[derive(Clone, Debug)]
@@ -160,13 +147,7 @@ fn check_variation(variation: &Variation) -> std::result::Result<(), String> {
             return Err(format!("set \"{}\" is read by none of its stages ({})", shown(set), stages.join(", ")));
         }
     }
-    let without_effect = |method: MethodName| match method {
-        MethodName::Hil => all_of(&variation.set, &NOT_OF_HIL),
-        MethodName::Bc => all_of(&variation.set, &NOT_OF_BC),
-        MethodName::Sc => all_of(&variation.set, &NOT_OF_SC),
-        MethodName::Ppo => all_of(&variation.set, &NOT_OF_PPO),
-        MethodName::BcRl => all_of(&variation.set, &NOT_OF_BC_RL),
-    };
+    let without_effect = |method: MethodName| all_of(&variation.set, &not_of(method));
     match variation.methods.iter().find(|method| without_effect(**method)) {
         Some(method) => {
             let (method, set) = (method.name(), shown(&variation.set.join(" ")));

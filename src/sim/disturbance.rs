@@ -4,7 +4,7 @@ use crate::config::SimulateSettings;
 use crate::pulse::Pulse;
 use crate::robot::VELOCITY_LIMITS_RAD_S;
 use crate::seed::normal;
-use crate::state::Action;
+use crate::state::{ARM_JOINTS, Action};
 use rand_chacha::ChaCha8Rng;
 
 /// Turns commanded into executed actions, along one episode.
@@ -12,7 +12,7 @@ use rand_chacha::ChaCha8Rng;
 pub struct Disturbance {
     settings: SimulateSettings,
     rng: ChaCha8Rng,
-    pulse: Pulse,
+    pulse: Pulse<ARM_JOINTS>,
 }
 
 impl Disturbance {

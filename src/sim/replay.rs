@@ -6,6 +6,7 @@ use crate::config::{FingerPulses, SceneSettings, SimulateSettings};
 use crate::demo::{Demo, Episode};
 use crate::error::Result;
 use crate::interrupt::Interrupt;
+use crate::pulse::Pulse;
 use crate::scene::Scene;
 use crate::seed::stream;
 use crate::state::{ARM_JOINTS, Action, FINGERS, JOINTS, State};
@@ -33,26 +34,19 @@ impl Controller for Replay<'_> {
 struct Excitation<'a> {
     settings: &'a FingerPulses,
     rng: ChaCha8Rng,
-    /// Control steps that a pulse still lasts.
-    left: u32,
-    speeds: [f64; FINGERS],
+    pulse: Pulse<FINGERS>,
 }
 
 impl Excitation<'_> {
     /// The next control step's commands \[rad/s\], unless they are the demo's.
     fn advance(&mut self) -> Option<[f64; FINGERS]> {
-        self.left = self.left.saturating_sub(1);
-        if self.left == 0 && self.rng.random::<f64>() < self.settings.probability {
-            self.left = self.settings.steps;
-            self.speeds = std::array::from_fn(|_| self.settings.speed_rad_s * (2.0 * self.rng.random::<f64>() - 1.0));
-        }
-        (self.left > 0).then_some(self.speeds)
+        let FingerPulses { probability, steps, speed_rad_s } = *self.settings;
+        self.pulse.next((probability, steps), &mut self.rng, |rng| speed_rad_s * (2.0 * rng.random::<f64>() - 1.0))
     }
 }
 
 /// Runs the commands of `demo` from its start under disturbances drawn from `rng`, for as many steps as the demo has, now and then with
-/// other commands for the `fingers`. Friction and
-/// mass are drawn anew and obstacles taken from the settings: a dataset does not hold them.
+/// other commands for the `fingers`. Friction and mass are drawn anew and obstacles taken from the settings: a dataset does not hold them.
 ///
 /// # Errors
 /// [`crate::error::Error::Interrupted`].
@@ -74,11 +68,11 @@ pub fn reexecute(
         friction: scene.friction.draw(&mut rng),
         block_mass_kg: scene.block_mass_kg.draw(&mut rng),
     };
-    let excitation = |rng: &mut ChaCha8Rng| {
+    let excitation = || {
         let rng = stream(rng.random(), "reexecute.fingers", index);
-        Excitation { settings: fingers, rng, left: 0, speeds: [0.0; FINGERS] }
+        Excitation { settings: fingers, rng, pulse: Pulse::default() }
     };
-    let fingers = (fingers.probability > 0.0).then(|| excitation(&mut rng));
+    let fingers = (fingers.probability > 0.0).then(excitation);
     let mut replay = Replay { commands: demo.actions().chunks_exact(JOINTS), fingers };
     let steps = u32::try_from(demo.len()).unwrap_or(u32::MAX);
     run_episode(index, &scene, &mut replay, &mut Disturbance::new(settings, rng), steps, interrupt)

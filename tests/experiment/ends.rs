@@ -1,6 +1,7 @@
 //! How a sweep ends early: interrupted, with a step that fails, beside another.
 
-use crate::sweep::{DIR, Sweep, TINY, same, text};
+use crate::files::text;
+use crate::sweep::{DIR, Sweep, TINY, same};
 use std::fs;
 use std::process::{Child, Command};
 use std::time::Duration;

@@ -3,6 +3,7 @@
 mod bad_input;
 mod edited;
 mod ends;
+mod files;
 mod kills;
 mod others;
 mod sweep;

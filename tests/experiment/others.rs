@@ -1,6 +1,7 @@
 //! What is printed or written instead of running, and datasets that were there before.
 
-use crate::sweep::{DIR, STEPS, Sweep, TINY, same, text};
+use crate::files::text;
+use crate::sweep::{DIR, STEPS, Sweep, TINY, same};
 use serde_json::Value;
 use std::fs;
 use std::process::Command;

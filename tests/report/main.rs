@@ -1,6 +1,9 @@
 //! `hilt report` as a process: pages of a tiny experiment in every form, whole, in part, refused.
 
-use std::collections::BTreeMap;
+#[path = "../experiment/files.rs"]
+mod files;
+
+use files::{contents, text};
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
@@ -74,26 +77,6 @@ impl Place {
         assert!(stderr.contains(says), "should say {says}: {stderr}");
         assert!(contents(self.0.path()) == before, "{words:?} changed files");
     }
-}
-
-fn text(bytes: &[u8]) -> String {
-    String::from_utf8_lossy(bytes).into_owned()
-}
-
-/// All files below a directory.
-fn contents(root: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
-    let (mut found, mut open) = (BTreeMap::new(), vec![root.to_path_buf()]);
-    while let Some(dir) = open.pop() {
-        for entry in fs::read_dir(&dir).into_iter().flatten() {
-            let path = entry.expect("entry").path();
-            if path.is_dir() {
-                open.push(path);
-            } else {
-                found.insert(path.strip_prefix(root).expect("below").to_path_buf(), fs::read(&path).expect("readable"));
-            }
-        }
-    }
-    found
 }
 
 /// The page is whole, asks for nothing from elsewhere, and has its figures beside it. Ids of the figures.

@@ -51,6 +51,18 @@ impl MethodName {
         ["hil", "bc", "sc", "ppo", "bc-rl"][self as usize]
     }
 
+    /// The settings that it trains with. State cloning has no warm start, which is behavior cloning; it may use as many updates as that, and its
+    /// learning rate.
+    pub fn own_settings(self, settings: &TrainSettings) -> TrainSettings {
+        let mut own = settings.clone();
+        if self == MethodName::Sc && settings.warm_start_updates > 0 {
+            own.warm_start_updates = 0;
+            own.min_updates = settings.min_updates.max(settings.warm_start_updates);
+            own.learning_rate = settings.warm_start_learning_rate;
+        }
+        own
+    }
+
     /// Whether it learns through a dynamics network.
     pub fn needs_dynamics(self) -> bool {
         matches!(self, MethodName::Hil | MethodName::Sc)
@@ -103,16 +115,7 @@ pub fn imitator(
     let Some(alpha) = method.alpha(settings) else {
         return Err(Error::Usage(format!("{} learns in the simulator, not from demos alone", method.name())));
     };
-    let from_scratch = from_scratch(settings);
-    let settings = if method == MethodName::Sc { &from_scratch } else { settings };
-    Ok(Box::new(Hil::new(inputs, dynamics, alpha, settings, seed)?))
-}
-
-/// State cloning has no warm start, which is behavior cloning; it may use as many updates as that, and its learning rate.
-pub(crate) fn from_scratch(settings: &TrainSettings) -> TrainSettings {
-    let updates = settings.warm_start_updates;
-    let learning_rate = if updates > 0 { settings.warm_start_learning_rate } else { settings.learning_rate };
-    TrainSettings { warm_start_updates: 0, min_updates: settings.min_updates.max(updates), learning_rate, ..settings.clone() }
+    Ok(Box::new(Hil::new(inputs, dynamics, alpha, &method.own_settings(settings), seed)?))
 }
 
 /// Trains a policy on demos. A run that goes on from a checkpoint of the same run ends with the same bits.

@@ -1,13 +1,15 @@
 //! What every section has: how far the experiment is, success of every arm, failures, how it was made.
 
-use super::finished::{Arm, Finished, Measured};
+use super::finished::{Arm, Finished, Measured, look};
 use super::words::{listed, percent, percent_within, seeds};
+use crate::experiment::DIRECTORY;
 use crate::experiment::estimate::{in_words, wall_s_of};
 use crate::report::chart::{Datum, Picture, Row, Rows};
 use crate::report::page::{Block, Cell, Column, Table};
 use crate::report::statistics::{Strata, interquartile_mean, mean};
 use crate::task::Task;
 use crate::tasks::FailureClass;
+use std::path::Path;
 
 /// How far the experiment is, and what the author says of it.
 pub fn head(finished: &Finished) -> Vec<Block> {
@@ -55,9 +57,9 @@ pub fn success_figure(finished: &Finished) -> Picture {
         let name = if many { format!("{words} ({})", arm.preset) } else { words };
         let data = tasks.iter().enumerate().filter_map(|(panel, task)| {
             let estimate = finished.success(arm, *task)?;
-            let singles = finished.scores(arm, *task).iter().map(|score| score.value).collect();
+            let singles = finished.singles(arm, *task);
             let series = arm.method.name().to_string();
-            Some(Datum { panel, look: arm.look(), series, value: estimate.value, interval: estimate.interval, singles })
+            Some(Datum { panel, look: look(arm.method), series, value: estimate.value, interval: estimate.interval, singles })
         });
         match rows.iter_mut().find(|row| row.name == name) {
             Some(row) => row.data.extend(data),
@@ -184,11 +186,8 @@ pub fn how_made(finished: &Finished) -> Block {
     episodes.dedup();
     let episodes = listed(&episodes.iter().map(u64::to_string).collect::<Vec<_>>());
     let methods: Vec<String> = experiment.methods.iter().map(|method| method.name().into()).collect();
-    let name = if crate::experiment::all().contains(&experiment.name) {
-        experiment.name.clone()
-    } else {
-        experiment.path.display().to_string()
-    };
+    let comes_with_hilt = experiment.path.parent() == Some(Path::new(DIRECTORY));
+    let name = if comes_with_hilt { experiment.name.clone() } else { experiment.path.display().to_string() };
     let (there, asked) = (seeds(&runs), seeds(&experiment.seeds));
     let plural = if experiment.presets.len() == 1 { "preset" } else { "presets" };
     Block::Words(format!(

@@ -2,6 +2,7 @@
 
 use super::finished::Measured;
 use crate::report::chart::Point;
+use crate::report::statistics::average;
 use crate::table::{Table, Values};
 
 /// A column of numbers; `None` when the table has none of this name.
@@ -20,7 +21,7 @@ pub fn over_epochs(runs: &[&Measured], name: &str) -> Vec<Point> {
     let epochs = columns.iter().map(Vec::len).min().unwrap_or(0);
     let at = |epoch: usize| {
         let values: Vec<f64> = columns.iter().map(|column| column[epoch]).collect();
-        let value = values.iter().sum::<f64>() / values.len() as f64;
+        let value = average(&values);
         let interval = [values.iter().copied().fold(f64::MAX, f64::min), values.iter().copied().fold(f64::MIN, f64::max)];
         Point { x: (epoch + 1) as f64, value, interval, singles: Vec::new() }
     };

@@ -1,6 +1,6 @@
 //! Success over the number of demos.
 
-use super::finished::{Arm, Finished};
+use super::finished::{Arm, Finished, look};
 use crate::config::Stage;
 use crate::report::chart::{Axis, Chart, Panel, Point, Series};
 use crate::report::page::Block;
@@ -49,17 +49,15 @@ fn panel(finished: &Finished, arms: &[Arm], (preset, task, of): (&str, Task, &st
     let series = finished.experiment.methods.iter().filter_map(|method| {
         let mut points: Vec<Point> = Vec::new();
         let arms = arms.iter().filter(|arm| (arm.preset, arm.method) == (preset, *method));
-        let mut look = 0;
         for arm in arms {
             let count = demos(finished, *arm, task);
             if let (Some(x), Some(success)) = (count, finished.success(*arm, task).filter(|_| kind(arm, count) == of)) {
-                let singles = finished.scores(*arm, task).iter().map(|score| score.value).collect();
+                let singles = finished.singles(*arm, task);
                 points.push(Point { x: x as f64, value: success.value, interval: success.interval, singles });
-                look = arm.look();
             }
         }
         points.sort_by(|a, b| a.x.total_cmp(&b.x));
-        (!points.is_empty()).then(|| Series { name: method.name().into(), look, points, dense: false })
+        (!points.is_empty()).then(|| Series { name: method.name().into(), look: look(*method), points, dense: false })
     });
     let series: Vec<Series> = series.collect();
     let words = [task.name(), of, if finished.experiment.presets.len() > 1 { preset } else { "" }];

@@ -99,6 +99,11 @@ impl Finished {
         self.of(arm, task).map(|m| Score { seed: m.run.seed, value: m.summary.success_rate }).collect()
     }
 
+    /// The same without the seeds.
+    pub fn singles(&self, arm: Arm, task: Task) -> Vec<f64> {
+        self.of(arm, task).map(|m| m.summary.success_rate).collect()
+    }
+
     /// Success of each seed of each task, an empty list for a task without one.
     pub fn strata(&self, arm: Arm, tasks: &[Task]) -> Strata {
         tasks.iter().map(|task| self.scores(arm, *task)).collect()
@@ -120,7 +125,7 @@ impl Finished {
     /// Mean time of the trainings of an arm and a task \[s\]: wall or processor time, as `of` has it; `None` where a log lacks it.
     pub fn train_s(&self, arm: Arm, task: Task, of: fn(&Measured) -> Option<f64>) -> Option<f64> {
         let times: Vec<f64> = self.of(arm, task).map(of).collect::<Option<_>>()?;
-        (!times.is_empty()).then(|| times.iter().sum::<f64>() / times.len() as f64)
+        (!times.is_empty()).then(|| statistics::average(&times))
     }
 
     /// An arm as this experiment has to name it: by what differs among its arms.
@@ -139,9 +144,9 @@ impl<'a> Arm<'a> {
     pub fn of(run: &'a Run) -> Self {
         Arm { preset: &run.preset, variation: &run.variation, method: run.method }
     }
+}
 
-    /// Colour and marker of its method, the same in every figure.
-    pub fn look(&self) -> usize {
-        MethodName::ALL.iter().position(|method| *method == self.method).unwrap_or(0)
-    }
+/// Colour and marker of a method, the same in every figure.
+pub fn look(method: MethodName) -> usize {
+    method as usize
 }

@@ -2,13 +2,13 @@
 //! end and evaluated, so a curve is not one training watched on its way.
 
 use super::curves::numbers;
-use super::finished::{Arm, Finished, Measured};
+use super::finished::{Arm, Finished, Measured, look};
 use super::words::{minutes, percent_within};
 use crate::data::dataset::{self, TRAIN, VALIDATION};
 use crate::error::Result;
 use crate::report::chart::{Axis, Chart, Panel, Point, Series};
 use crate::report::page::{Block, Cell, Column, Table};
-use crate::report::statistics::Estimate;
+use crate::report::statistics::{Estimate, average};
 use crate::task::Task;
 
 /// Column of the metrics of a method that acts in the simulator: control steps so far.
@@ -96,10 +96,9 @@ fn lengths(finished: &Finished) -> Result<Vec<Length<'_>>> {
             let runs: Vec<&Measured> = finished.of(arm, task).collect();
             let Some(success) = finished.success(arm, task) else { continue };
             let steps = runs.iter().map(|m| env_steps(finished, m)).collect::<Result<Vec<f64>>>()?;
-            let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len() as f64;
             let epochs: Vec<f64> = runs.iter().map(|m| m.metrics.rows() as f64).collect();
-            let singles = runs.iter().map(|m| m.summary.success_rate).collect();
-            let (epochs, env_steps, train_s) = (mean(&epochs), mean(&steps), finished.train_s(arm, task, clock));
+            let singles = finished.singles(arm, task);
+            let (epochs, env_steps, train_s) = (average(&epochs), average(&steps), finished.train_s(arm, task, clock));
             all.push(Length { arm, task, epochs, env_steps, train_s, success, singles });
         }
     }
@@ -128,11 +127,10 @@ fn chart(finished: &Finished, lengths: &[Length], about: (&str, &str, &str, Axis
         for task in finished.tasks() {
             let series = experiment.methods.iter().map(|method| {
                 let of = lengths.iter().filter(|l| (l.arm.preset, l.arm.method, l.task) == (preset, *method, task));
-                let look = of.clone().next().map_or(0, |l| l.arm.look());
                 let point = |l: &Length| {
                     Some(Point { x: x(l)?, value: l.success.value, interval: l.success.interval, singles: l.singles.clone() })
                 };
-                Series { name: method.name().into(), look, points: of.filter_map(point).collect(), dense: false }
+                Series { name: method.name().into(), look: look(*method), points: of.filter_map(point).collect(), dense: false }
             });
             let series: Vec<Series> = series.filter(|series| !series.points.is_empty()).collect();
             let title = if experiment.presets.len() > 1 { format!("{task} ({preset})") } else { task.to_string() };

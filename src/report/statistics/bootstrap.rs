@@ -15,8 +15,13 @@ const ENDS: [f64; 2] = [0.025, 0.975];
 pub(super) struct Draw(ChaCha8Rng);
 
 impl Draw {
+    /// As many of these values, with repetitions.
+    pub(super) fn of(&mut self, values: &[f64]) -> Vec<f64> {
+        self.indices(values.len()).into_iter().map(|i| values[i]).collect()
+    }
+
     /// `n` numbers below `n`, with repetitions.
-    pub(super) fn indices(&mut self, n: usize) -> Vec<usize> {
+    fn indices(&mut self, n: usize) -> Vec<usize> {
         // The product's upper half; n is small, so that no number is preferred by more than n / 2^64.
         let below = |random: u64| ((u128::from(random) * n as u128) >> u64::BITS) as usize;
         (0..n).map(|_| below(self.0.next_u64())).collect()

@@ -1,7 +1,7 @@
 //! Whether one method is better than another.
 
 use super::bootstrap::{Draw, percentiles};
-use super::{Estimate, Score, Strata, average};
+use super::{Estimate, Score, Strata, average, mean_of, values};
 
 /// Seeds below which no interval over them is believed: of two there are only three different samples.
 pub const FEWEST_SEEDS: usize = 3;
@@ -40,14 +40,13 @@ impl Comparison {
         let both: Vec<(Vec<f64>, Vec<f64>)> =
             x.iter().zip(y).map(|(x, y)| (values(x), values(y))).filter(|(x, y)| !x.is_empty() && !y.is_empty()).collect();
         let fewest = pairs.iter().map(Vec::len).min()?;
-        let difference = |tasks: &[Vec<f64>]| average(&tasks.iter().map(|task| average(task)).collect::<Vec<_>>());
-        let drawn_pairs = |draw: &mut Draw| difference(&pairs.iter().map(|task| drawn(task, draw)).collect::<Vec<_>>());
+        let drawn_pairs = |draw: &mut Draw| mean_of(&pairs.iter().map(|task| draw.of(task)).collect::<Vec<_>>());
         let drawn_apart = |draw: &mut Draw| {
-            let apart: Vec<_> = both.iter().map(|(x, y)| (drawn(x, draw), drawn(y, draw))).collect();
+            let apart: Vec<_> = both.iter().map(|(x, y)| (draw.of(x), draw.of(y))).collect();
             improvement(&apart)
         };
         Some(Comparison {
-            difference: Estimate { value: difference(&pairs), interval: percentiles("difference", drawn_pairs) },
+            difference: Estimate { value: mean_of(&pairs), interval: percentiles("difference", drawn_pairs) },
             improvement: Estimate { value: improvement(&both), interval: percentiles("improvement", drawn_apart) },
             pairs: fewest,
         })
@@ -65,17 +64,9 @@ impl Comparison {
     }
 }
 
-fn values(scores: &[Score]) -> Vec<f64> {
-    scores.iter().map(|score| score.value).collect()
-}
-
 /// X - Y of each seed that both have.
 fn differences(x: &[Score], y: &[Score]) -> Vec<f64> {
     x.iter().filter_map(|x| y.iter().find(|y| y.seed == x.seed).map(|y| x.value - y.value)).collect()
-}
-
-fn drawn(values: &[f64], draw: &mut Draw) -> Vec<f64> {
-    draw.indices(values.len()).into_iter().map(|i| values[i]).collect()
 }
 
 /// The Mann-Whitney statistic as a share of all pairs, mean over tasks.

@@ -46,18 +46,19 @@ pub fn interquartile_mean(scores: &Strata) -> Estimate {
 }
 
 fn estimate(scores: &Strata, statistic: impl Fn(&[Vec<f64>]) -> f64) -> Estimate {
-    let values: Vec<Vec<f64>> = scores.iter().map(|task| task.iter().map(|score| score.value).collect()).collect();
-    let sizes: Vec<usize> = values.iter().map(Vec::len).collect();
-    let redraw = |draw: &mut Draw| {
-        let of_task = |task: &Vec<f64>| draw.indices(task.len()).into_iter().map(|i| task[i]).collect();
-        let drawn: Vec<Vec<f64>> = values.iter().map(of_task).collect();
-        statistic(&drawn)
-    };
-    let interval = if sizes.iter().all(|n| *n == 1) { [statistic(&values); 2] } else { percentiles("estimate", redraw) };
+    let values: Vec<Vec<f64>> = scores.iter().map(|task| values(task)).collect();
+    let redraw = |draw: &mut Draw| statistic(&values.iter().map(|task| draw.of(task)).collect::<Vec<_>>());
+    let interval =
+        if values.iter().all(|task| task.len() == 1) { [statistic(&values); 2] } else { percentiles("estimate", redraw) };
     Estimate { value: statistic(&values), interval }
 }
 
-fn average(values: &[f64]) -> f64 {
+fn values(scores: &[Score]) -> Vec<f64> {
+    scores.iter().map(|score| score.value).collect()
+}
+
+/// The mean of some numbers; of none it is none.
+pub fn average(values: &[f64]) -> f64 {
     values.iter().sum::<f64>() / values.len() as f64
 }
 
