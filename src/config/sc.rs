@@ -1,6 +1,6 @@
 //! Settings of L_SC. Defaults are the preset `best`.
 
-use super::choices::{FingerCloning, Pairs, StateScale};
+use super::choices::{FeatureSet, FingerCloning, Pairs, StateScale};
 use super::scene::PulseSettings;
 use serde::{Deserialize, Serialize};
 
@@ -8,6 +8,9 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct ScSettings {
+    /// What the policy of method `sc` sees; those of the others see `train.features`. Without the near field it reaches the goal of
+    /// pick-and-place and does not let go.
+    pub features: FeatureSet,
     /// Scale of each state entry in L_SC; without effect under `train.loss = "raw-sum"`.
     pub scale: StateScale,
     /// Whether L_SC leaves out joint velocities. They repeat the action: with them, coming back to the path costs as much as leaving it.
@@ -31,6 +34,7 @@ pub struct ScSettings {
 impl Default for ScSettings {
     fn default() -> Self {
         ScSettings {
+            features: FeatureSet::FkNear,
             scale: StateScale::Step,
             mask_dq: true,
             fingers: FingerCloning::Following,

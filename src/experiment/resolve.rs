@@ -48,9 +48,9 @@ const OF_PPO_ALONE: &[&str] = &[
 /// Keys without effect on a method.
 fn not_of(method: MethodName) -> Vec<&'static str> {
     let parts: &[&[&str]] = match method {
-        MethodName::Hil => &[OF_REWARDS],
+        MethodName::Hil => &[&["train.sc.features"], OF_REWARDS],
         MethodName::Bc => &[OF_STATE_CLONING, OF_REWARDS],
-        MethodName::Sc => &[&["train.alpha", "train.bc_batch"], OF_REWARDS],
+        MethodName::Sc => &[&["train.features", "train.alpha", "train.bc_batch"], OF_REWARDS],
         MethodName::Ppo => &[OF_DEMOS, OF_STATE_CLONING, &["train.bc_rl."]],
         MethodName::BcRl => &[OF_STATE_CLONING, OF_PPO_ALONE],
     };

@@ -51,11 +51,15 @@ impl MethodName {
         ["hil", "bc", "sc", "ppo", "bc-rl"][self as usize]
     }
 
-    /// The settings that it trains with. State cloning has no warm start, which is behavior cloning; it may use as many updates as that, and its
-    /// learning rate.
+    /// The settings that it trains with. State cloning has features of its own, and no warm start, which is behavior cloning; it may use as
+    /// many updates as that, and its learning rate.
     pub fn own_settings(self, settings: &TrainSettings) -> TrainSettings {
         let mut own = settings.clone();
-        if self == MethodName::Sc && settings.warm_start_updates > 0 {
+        if self != MethodName::Sc {
+            return own;
+        }
+        own.features = settings.sc.features;
+        if settings.warm_start_updates > 0 {
             own.warm_start_updates = 0;
             own.min_updates = settings.min_updates.max(settings.warm_start_updates);
             own.learning_rate = settings.warm_start_learning_rate;
