@@ -43,7 +43,7 @@ fn demo(index: usize) -> Demo {
             actions.extend((0..JOINTS).map(|i| wave(i) as f32));
         }
     }
-    Demo::new(Task::Stack, states, actions.clone(), actions).expect("lengths match")
+    Demo::new(&Task::Stack.layout(), states, actions.clone(), actions).expect("lengths match")
 }
 
 fn method() -> Hil {

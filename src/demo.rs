@@ -1,9 +1,11 @@
 //! Trajectories: an executed [`Episode`] with all that was recorded, and a [`Demo`], the arrays that learning reads.
 
+use crate::layout::Layout;
 use crate::scene::Scene;
-use crate::state::{Action, FINGERS, JOINTS, State};
-use crate::task::{FailureClass, Task};
+use crate::state::{Action, FINGERS, State};
+use crate::task::FailureClass;
 use serde::{Deserialize, Serialize};
+use std::sync::Arc;
 
 /// No angle \[rad\], position \[m\], velocity \[rad/s, m/s\] or command of this world is larger: what is comes from a simulation that broke down
 /// or from a damaged file, and its square may be more than single precision holds.
@@ -90,50 +92,42 @@ pub struct Episode {
     pub failure: Option<FailureClass>,
 }
 
-impl Episode {
-    /// The arrays that learning reads.
-    ///
-    /// # Errors
-    /// See [`Demo::new`].
-    pub fn to_demo(&self) -> Result<Demo, String> {
-        let states = self.steps.iter().chain([&self.last]).flat_map(|s| s.state.to_row()).collect();
-        let rows = |pick: fn(&Step) -> &Action| self.steps.iter().flat_map(|s| pick(s).map(|v| v as f32)).collect::<Vec<f32>>();
-        Demo::new(self.scene.task, states, rows(|s| &s.commanded), rows(|s| &s.executed))
-    }
-}
-
 /// d = <(s_t^E, a_t^E)>: one demo trajectory, T + 1 states and T actions, row-major f32.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Demo {
-    task: Task,
+    layout: Arc<Layout>,
+    state_dim: usize,
+    action_dim: usize,
     states: Vec<f32>,
     actions: Vec<f32>,
     executed: Vec<f32>,
 }
 
 impl Demo {
-    /// Checks and wraps the arrays: `states` (T+1) x D, `actions` (commanded) and `executed` T x 9 \[rad/s\].
+    /// Checks and wraps the arrays: `states` (T+1) x D, `actions` (commanded) and `executed` T x A, in the units of the
+    /// layout.
     ///
     /// # Errors
     /// Says which length or value is wrong: T = 0, rows that do not fit, or a number that is not finite.
-    pub fn new(task: Task, states: Vec<f32>, actions: Vec<f32>, executed: Vec<f32>) -> Result<Self, String> {
-        let dim = task.state_dim();
-        let steps = actions.len() / JOINTS;
-        if steps == 0 || actions.len() != steps * JOINTS {
-            return Err(format!("a demo needs T x {JOINTS} actions with T >= 1, got {} numbers", actions.len()));
+    pub fn new(layout: &Arc<Layout>, states: Vec<f32>, actions: Vec<f32>, executed: Vec<f32>) -> Result<Self, String> {
+        let (dim, action_dim) = (layout.state_dim(), layout.action_dim());
+        let steps = actions.len() / action_dim;
+        if steps == 0 || actions.len() != steps * action_dim {
+            return Err(format!("a demo needs T x {action_dim} actions with T >= 1, got {} numbers", actions.len()));
         }
         if executed.len() != actions.len() {
             return Err(format!("{} executed against {} commanded action numbers", executed.len(), actions.len()));
         }
         if states.len() != (steps + 1) * dim {
             return Err(format!(
-                "{task} has states of {dim} numbers, so {steps} actions need {} state numbers, got {}",
+                "{} has states of {dim} numbers, so {steps} actions need {} state numbers, got {}",
+                layout.name,
                 (steps + 1) * dim,
                 states.len()
             ));
         }
         for (name, values, width) in
-            [("state", &states, dim), ("action", &actions, JOINTS), ("executed action", &executed, JOINTS)]
+            [("state", &states, dim), ("action", &actions, action_dim), ("executed action", &executed, action_dim)]
         {
             if let Some(at) = values.iter().position(|v| !v.is_finite()) {
                 return Err(format!(
@@ -144,18 +138,18 @@ impl Demo {
                 ));
             }
         }
-        Ok(Demo { task, states, actions, executed })
+        Ok(Demo { layout: Arc::clone(layout), state_dim: dim, action_dim, states, actions, executed })
     }
 
-    /// The task.
-    pub fn task(&self) -> Task {
-        self.task
+    /// What its rows hold.
+    pub fn layout(&self) -> &Arc<Layout> {
+        &self.layout
     }
 
     /// Number of actions T.
     #[allow(clippy::len_without_is_empty, reason = "a demo is never empty")]
     pub fn len(&self) -> usize {
-        self.actions.len() / JOINTS
+        self.actions.len() / self.action_dim
     }
 
     /// All states, (T+1) x D row-major.
@@ -163,49 +157,52 @@ impl Demo {
         &self.states
     }
 
-    /// Commanded actions, T x 9 row-major \[rad/s\]: the labels of behavior cloning.
+    /// Commanded actions, T x A row-major: the labels of behavior cloning.
     pub fn actions(&self) -> &[f32] {
         &self.actions
     }
 
-    /// Executed actions, T x 9 row-major \[rad/s\]: the inputs of the dynamics network.
+    /// Executed actions, T x A row-major: the inputs of the dynamics network.
     pub fn executed(&self) -> &[f32] {
         &self.executed
     }
 
-    /// Commanded action t (0-based) \[rad/s\].
+    /// Commanded action t (0-based).
     pub fn action(&self, t: usize) -> &[f32] {
-        &self.actions[t * JOINTS..(t + 1) * JOINTS]
+        &self.actions[t * self.action_dim..(t + 1) * self.action_dim]
     }
 
-    /// Executed action t (0-based) \[rad/s\].
+    /// Executed action t (0-based).
     pub fn executed_action(&self, t: usize) -> &[f32] {
-        &self.executed[t * JOINTS..(t + 1) * JOINTS]
+        &self.executed[t * self.action_dim..(t + 1) * self.action_dim]
     }
 
     /// State t (0-based).
     pub fn state(&self, t: usize) -> &[f32] {
-        let d = self.task.state_dim();
-        &self.states[t * d..(t + 1) * d]
+        &self.states[t * self.state_dim..(t + 1) * self.state_dim]
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::layout::{Holds, Span};
 
     #[test]
     fn a_demo_refuses_wrong_lengths_and_nan() {
-        let (d, t) = (Task::PickUp.state_dim(), 3);
-        let make =
-            |states: usize, actions: usize| Demo::new(Task::PickUp, vec![0.0; states], vec![0.0; actions], vec![0.0; actions]);
-        assert_eq!(make((t + 1) * d, t * JOINTS).expect("fits").len(), t);
-        assert!(make(t * d, t * JOINTS).is_err());
+        let span = |holds, n| Span { name: "x".into(), holds, entries: vec!["x".into(); n] };
+        let (d, a, t) = (5, 2, 3);
+        let (state, action) = (vec![span(Holds::Numbers, d)], vec![span(Holds::Commands, a)]);
+        let layout = Layout { name: "toy".into(), period_s: 0.1, state, action, action_limits: vec![], aims: vec![], arm: None };
+        let layout = Arc::new(layout);
+        let make = |states: usize, actions: usize| Demo::new(&layout, vec![0.0; states], vec![0.0; actions], vec![0.0; actions]);
+        assert_eq!(make((t + 1) * d, t * a).expect("fits").len(), t);
+        assert!(make(t * d, t * a).is_err());
         assert!(make(d, 0).is_err());
-        assert!(make((t + 1) * d, t * JOINTS + 1).is_err());
+        assert!(make((t + 1) * d, t * a + 1).is_err());
         let mut states = vec![0.0; (t + 1) * d];
         states[d + 2] = f32::NAN;
-        let message = Demo::new(Task::PickUp, states, vec![0.0; t * JOINTS], vec![0.0; t * JOINTS]).unwrap_err();
+        let message = Demo::new(&layout, states, vec![0.0; t * a], vec![0.0; t * a]).unwrap_err();
         assert!(message.contains("step 1, entry 2"), "{message}");
     }
 }

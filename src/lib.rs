@@ -7,7 +7,7 @@
 //!
 //! | paper | here | what it is |
 //! |---|---|---|
-//! | s_t, a_t | [`state`] | state of 25 to 32 numbers (rad, rad/s, m, quaternions x y z w); nine joint velocities \[rad/s\] |
+//! | s_t, a_t | [`state`], [`mod@layout`] | state of 25 to 32 numbers (rad, rad/s, m, quaternions x y z w); nine joint velocities \[rad/s\]; what each entry is |
 //! | d = <(s_t^E, a_t^E)> | [`demo::Demo`] | a demonstration: T + 1 states, T actions |
 //! | pi_theta | [`learn::Policy`] | Gaussian: mean network, log standard deviations |
 //! | f_phi | [`learn::Dynamics`] | the next state from a state and an action |
@@ -31,7 +31,7 @@
 //!
 //! - leaves that all may use: [`error`], [`guard`], [`interrupt`], [`math`], [`seed`], [`table`], [`tensor`], [`words`]
 //! - [`nn`]: networks and their engine, knows no robots
-//! - contracts: [`task`], [`state`], [`scene`], [`demo`], [`mod@env`]; [`robot`]; [`config`], [`pulse`]
+//! - contracts: [`mod@layout`] (what the entries of a state and an action are: all that learning knows of robot and task), [`task`], [`state`], [`scene`], [`demo`], [`mod@env`]; [`robot`]; [`config`], [`pulse`]
 //! - [`tasks`], then [`plan`] (scene to demonstration) and [`sim`] (contact physics, the only home of rapier)
 //! - [`data`]: files, the only home of MCAP, Arrow, Parquet and safetensors; knows no learning
 //! - [`learn`]: networks of policy and dynamics, losses, methods, and the loop around them; knows neither files nor simulator
@@ -51,6 +51,7 @@ pub mod eval;
 pub mod experiment;
 pub mod guard;
 pub mod interrupt;
+pub mod layout;
 pub mod learn;
 pub mod math;
 pub mod nn;

@@ -60,7 +60,7 @@ fn demo(index: usize) -> Demo {
     let value = |i: usize| (((i + index) * 37 % 101) as f32 - 50.0) / 100.0;
     let states = (0..(steps + 1) * dim).map(value).collect();
     let actions: Vec<f32> = (0..steps * 9).map(value).collect();
-    Demo::new(Task::PickUp, states, actions.clone(), actions).expect("lengths match")
+    Demo::new(&Task::PickUp.layout(), states, actions.clone(), actions).expect("lengths match")
 }
 
 /// One update of Algorithm 1 on four demos that depend on `i`.

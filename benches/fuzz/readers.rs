@@ -222,7 +222,7 @@ impl Reader {
             "policy" => {
                 let (tensors, meta, _) = weights::read(path, "policy")?;
                 let policy = Policy::from_tensors(&tensors, &meta).map_err(misfit)?;
-                policy.act(&vec![0.1; policy.task().state_dim()]);
+                policy.act(&vec![0.1; policy.layout().state_dim()]);
                 Ok(())
             }
             "dynamics" => {

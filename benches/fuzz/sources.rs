@@ -55,14 +55,15 @@ pub fn demo() -> Demo {
     let (demo, dim) = (&found.demos[0], found.task.state_dim());
     let cut = |rows: &[f32], width: usize, count: usize| rows[..width * count].to_vec();
     let (actions, executed) = (cut(demo.actions(), JOINTS, STEPS), cut(demo.executed(), JOINTS, STEPS));
-    Demo::new(found.task, cut(demo.states(), dim, STEPS + 1), actions, executed).expect("a demo")
+    Demo::new(demo.layout(), cut(demo.states(), dim, STEPS + 1), actions, executed).expect("a demo")
 }
 
 /// Writes a dataset of two short episodes.
 pub fn dataset(root: &Path) {
     let demo = demo();
     let of = |source_index| DatasetEpisode { source_index, demo: demo.clone(), rewards: vec![0.5; STEPS], success: true };
-    dataset::write(root, demo.task(), &[of(0), of(1)].as_slice().into(), &provenance("convert")).expect("a dataset");
+    let task = demo.layout().name.parse().expect("a task's demo");
+    dataset::write(root, task, &[of(0), of(1)].as_slice().into(), &provenance("convert")).expect("a dataset");
 }
 
 /// A dynamics network of a few units.

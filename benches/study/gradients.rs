@@ -9,6 +9,7 @@ use hilt::learn::Dynamics;
 use hilt::report::table::text_table;
 use hilt::sim::World;
 use hilt::state::{ARM_JOINTS, Action, JOINTS};
+use hilt::tasks::with_layout;
 use std::ops::Range;
 use std::path::Path;
 
@@ -40,7 +41,7 @@ pub fn run(args: &Args) -> Result<()> {
     let (recordings, dynamics) = (args.recordings.as_deref(), args.dynamics.as_deref());
     let (recordings, dynamics) = recordings.zip(dynamics).context("give --recordings DIR and --dynamics FILE of one run")?;
     let (tensors, meta, _) = weights::read(dynamics, "dynamics")?;
-    let dynamics = Dynamics::from_tensors(&tensors, &meta).map_err(|why| anyhow!(why))?;
+    let dynamics = Dynamics::from_tensors(&tensors, &with_layout(meta)).map_err(|why| anyhow!(why))?;
     let mut sums = [[Products::default(); PAIRS.len()]; Phase::ALL.len()];
     for index in 0..args.episodes.min(20) {
         let path = recordings.join(recording::file_name(index));
@@ -94,9 +95,10 @@ fn answer(joint: usize, executed: &Action, state_after: impl Fn(&Action) -> Resu
 
 /// The state after `action` and the recorded actions that follow, by the network.
 fn predicted(dynamics: &Dynamics, episode: &Episode, t: usize, action: &Action) -> Vec<f64> {
-    let mut state = dynamics.predict(&episode.steps[t].state.to_row(), action);
+    let single = |action: &Action| action.map(|v| v as f32);
+    let mut state = dynamics.predict(&episode.steps[t].state.to_row(), &single(action));
     for step in &episode.steps[t + 1..t + STEPS] {
-        state = dynamics.predict(&state, &step.executed);
+        state = dynamics.predict(&state, &single(&step.executed));
     }
     state.iter().map(|v| f64::from(*v)).collect()
 }

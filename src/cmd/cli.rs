@@ -2,7 +2,7 @@
 
 use super::console::Console;
 use super::context::{Context, Outcome};
-use super::{convert, evaluate, experiment, inspect, plan, pretrain, render, report, settings, simulate, train};
+use super::{convert, evaluate, experiment, inspect, plan, pretrain, render, report, robot, settings, simulate, train};
 use crate::error::{Error, Result};
 use crate::interrupt::Interrupt;
 use clap::{Parser, Subcommand};
@@ -52,6 +52,7 @@ enum Command {
     Settings(settings::Args),
     Experiment(experiment::Args),
     Report(report::Args),
+    Robot(robot::Args),
 }
 
 impl Cli {
@@ -79,6 +80,7 @@ impl Cli {
             Command::Report(args) => report::run(args, &context),
             Command::Inspect(args) => return inspect::run(args, &context),
             Command::Render(args) => render::run(args, &context),
+            Command::Robot(args) => return robot::run(args, &context),
             Command::Settings(args) => return settings::run(args, &context),
         };
         if outcome.is_ok() {

@@ -16,6 +16,7 @@ use crate::robot::urdf;
 use crate::scene::Scene;
 use crate::seed;
 use crate::sim::{Controller, Follower};
+use crate::tasks::with_layout;
 use serde::Serialize;
 use serde_json::Value;
 use std::collections::BTreeMap;
@@ -116,7 +117,16 @@ impl Args {
 fn read_policy(path: &Path, pipeline: &Pipeline) -> Result<(Policy, Provenance, ContentHash)> {
     let (tensors, meta, made, content) = weights::read_hashed(path, train::KIND)?;
     same_task(path, made.task, pipeline.task)?;
-    Ok((Policy::from_tensors(&tensors, &meta).map_err(|why| Error::input(path, why))?, made, content))
+    let policy = Policy::from_tensors(&tensors, &with_layout(meta)).map_err(|why| Error::input(path, why))?;
+    let (layout, ours) = (policy.layout(), pipeline.task.layout());
+    if *layout != ours {
+        let [theirs, ours] = [layout, &ours].map(|l| format!("{} numbers and moves {}", l.state_dim(), l.action_dim()));
+        let what = format!(
+            "sees {theirs}, this robot in this task shows {ours}, or in another order (\"layout\" of its description); train it anew"
+        );
+        return Err(Error::input(path, what));
+    }
+    Ok((policy, made, content))
 }
 
 /// Sections of the settings that make an episode what it is.

@@ -3,6 +3,7 @@ use super::{Context, Outcome, output, pretrain, train};
 use crate::data::{self, weights};
 use crate::error::{Error, Result};
 use crate::learn::{Dynamics, Policy};
+use crate::tasks::with_layout;
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 
@@ -33,6 +34,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome> {
 fn check_network(path: &Path, kind: &Value) -> Result<()> {
     let Some(kind) = kind.as_str().filter(|kind| [train::KIND, pretrain::KIND].contains(kind)) else { return Ok(()) };
     let (tensors, meta, _) = weights::read(path, kind)?;
+    let meta = with_layout(meta);
     let made = if kind == train::KIND {
         Policy::from_tensors(&tensors, &meta).map(drop)
     } else {

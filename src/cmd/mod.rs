@@ -17,6 +17,7 @@ mod plan;
 mod pretrain;
 mod render;
 mod report;
+mod robot;
 mod settings;
 mod shard;
 mod simulate;

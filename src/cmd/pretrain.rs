@@ -73,7 +73,7 @@ fn reexecute(demos: &[Demo], pipeline: &Pipeline, seed: u64, context: &Context) 
         let rng = seed::stream(seed, "pretrain.reexecute", index);
         let episode = sim::reexecute(
             index,
-            demo,
+            (pipeline.task, demo),
             &pipeline.scene,
             &settings,
             &pipeline.pretrain.reexecute_fingers,

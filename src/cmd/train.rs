@@ -13,6 +13,7 @@ use crate::learn::{self, BcRl, Checkpoint, Dynamics, Hooks, Inputs, Method, Meth
 use crate::scene::Scene;
 use crate::sim::{Controller, TaskEnv};
 use crate::task::Task;
+use crate::tasks::with_layout;
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -90,7 +91,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome> {
     let reward = if args.method == MethodName::BcRl { settings.bc_rl.reward } else { settings.ppo.reward };
     let world = |horizon_steps| -> Result<Box<dyn Env>> { Ok(Box::new(TaskEnv::new(&pipeline, reward, horizon_steps, seed))) };
     let learner: Box<dyn Method> = match demos {
-        None => Box::new(Ppo::new(pipeline.task, settings, seed, world)?),
+        None => Box::new(Ppo::new(&pipeline.task.layout(), settings, seed, world)?),
         Some(inputs) if args.method == MethodName::BcRl => Box::new(BcRl::new(inputs, settings, seed, world)?),
         Some(inputs) => imitator(args.method, inputs, dynamics, settings, seed)?,
     };
@@ -154,5 +155,5 @@ fn read_demos(dir: &Path, pipeline: &Pipeline) -> Result<(Inputs, ContentHash)> 
 fn read_dynamics(path: &Path, task: Task) -> Result<(Dynamics, ContentHash)> {
     let (tensors, meta, made, content) = weights::read_hashed(path, pretrain::KIND)?;
     same_task(path, made.task, task)?;
-    Ok((Dynamics::from_tensors(&tensors, &meta).map_err(|why| Error::input(path, why))?, content))
+    Ok((Dynamics::from_tensors(&tensors, &with_layout(meta)).map_err(|why| Error::input(path, why))?, content))
 }

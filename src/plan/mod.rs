@@ -4,7 +4,6 @@
 //! something stands in the way.
 
 mod block;
-mod collision;
 mod grasp;
 mod path;
 mod planner;

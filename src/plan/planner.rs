@@ -10,7 +10,7 @@ use crate::config::PlanSettings;
 use crate::demo::Phase;
 use crate::interrupt::Interrupt;
 use crate::robot::jaco::PRESHAPE_RAD;
-use crate::robot::{Ik, READY_Q_RAD};
+use crate::robot::{Ik, READY_Q_RAD, built_in};
 use crate::scene::Scene;
 use crate::state::{ARM_JOINTS, CONTROL_DT_S, Context, JOINTS};
 use nalgebra::Isometry3;
@@ -32,7 +32,7 @@ impl Planner {
         let limits = Limits::new(settings);
         let interrupt = Interrupt::default();
         let closing = closing(&limits, &interrupt);
-        Planner { motions: Motions { settings: settings.clone(), limits, ik: Ik::new(), interrupt }, closing }
+        Planner { motions: Motions { settings: settings.clone(), limits, ik: Ik::new(&built_in::jaco()), interrupt }, closing }
     }
 
     /// Lets Ctrl-C end the planning of a scene: a plan that was on its way is an error then.

@@ -1,8 +1,8 @@
 //! What a plan must keep clear of: table, obstacles, base block, the block itself, and the arm's own base.
 
-use super::collision::{Solid, place_links};
 use crate::config::SceneSettings;
 use crate::error::{Error, Result};
+use crate::robot::collision::{Solid, place_links};
 use crate::robot::jaco::{HAND_LINK, LINK_NAMES, LINK_SHAPES};
 use crate::robot::kinematics::tool_of;
 use crate::robot::{Arm, LinkPoses, READY_Q_RAD};

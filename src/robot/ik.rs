@@ -1,23 +1,19 @@
 //! Differential inverse kinematics as a quadratic program: joint steps that reduce the tool's pose error, within joint and velocity limits.
 
-use super::jaco::{POSITION_LIMITS_RAD, VELOCITY_LIMITS_RAD_S};
-use super::kinematics::Arm;
-use crate::state::{ARM_JOINTS, JOINTS};
+use super::model::{Jacobian, Robot};
 use clarabel::algebra::CscMatrix;
 use clarabel::solver::{DefaultSettings, DefaultSolver, IPSolver, SolverStatus, SupportedConeT};
-use nalgebra::{Isometry3, Matrix6, Vector6};
+use nalgebra::{DMatrix, Isometry3, Vector6};
+use std::sync::Arc;
 
 /// A step may use this much motion at the joints' velocity limits \[s\]: 0.16 to 0.21 rad, small enough for the linear model.
 const STEP_S: f64 = 0.25;
 /// Weight of a rotation error against a position error \[m/rad\]: about the lever of the hand.
 const ROTATION_LEVER_M: f64 = 0.2;
-/// Weight of the pull to [`WRIST_PLANE_RAD`] \[m^2/rad^2\]: costs 0.01 mm of position. Near the wrist singularity (forearm vertical, joint 5 at
-/// a full turn: blocks nearer than 0.35 m) it keeps the wrist from swinging round; joint 5 passes the full turn and stays smooth.
+/// Weight of the pull to the robot's posture \[m^2/rad^2\]: costs 0.01 mm of position. It settles what the tool's pose leaves free: the elbow of
+/// an arm with seven joints; near the Jaco's wrist singularity (forearm vertical, joint 5 at a full turn: blocks nearer than 0.35 m) it keeps
+/// the wrist from swinging round, and joint 5 passes the full turn and stays smooth.
 const POSTURE_WEIGHT: f64 = 1e-5;
-/// Joint 4 where the wrist bends in the plane of the arm \[rad\].
-const WRIST_PLANE_RAD: f64 = std::f64::consts::PI;
-/// Index of joint 4.
-const WRIST_ROLL: usize = 3;
 /// Floor under all joints' weights: keeps the program strictly convex where the Jacobian is not.
 const POSTURE_FLOOR: f64 = 1e-9;
 /// Converged when no joint moves more \[rad\]: the next step would move its square.
@@ -43,24 +39,19 @@ pub struct Unreachable {
     pub rotation_error_rad: f64,
 }
 
-/// The solver: the arm and one program of fixed structure, whose numbers are exchanged at every step.
+/// The solver: the robot and one program of fixed structure, whose numbers are exchanged at every step.
 pub struct Ik {
-    arm: Arm,
+    robot: Arc<Robot>,
     program: DefaultSolver<f64>,
 }
 
-impl Default for Ik {
-    fn default() -> Self {
-        Ik::new()
-    }
-}
-
 impl Ik {
-    /// For the Jaco.
-    pub fn new() -> Self {
-        let ones = upper_triangle(&Matrix6::from_element(1.0));
-        let (columns, rows) = upper_structure();
-        let cost = CscMatrix::new(ARM_JOINTS, ARM_JOINTS, columns, rows, ones);
+    /// For this robot.
+    pub fn new(robot: &Arc<Robot>) -> Self {
+        let n = robot.arm;
+        let ones = upper_triangle(&DMatrix::from_element(n, n, 1.0));
+        let (columns, rows) = upper_structure(n);
+        let cost = CscMatrix::new(n, n, columns, rows, ones);
         let settings = DefaultSettings {
             verbose: false,
             max_threads: 1,
@@ -72,59 +63,68 @@ impl Ik {
         };
         let program = DefaultSolver::new(
             &cost,
-            &[0.0; ARM_JOINTS],
-            &box_rows(),
-            &[1.0; 2 * ARM_JOINTS],
-            &[SupportedConeT::NonnegativeConeT(2 * ARM_JOINTS)],
+            &vec![0.0; n],
+            &box_rows(n),
+            &vec![1.0; 2 * n],
+            &[SupportedConeT::NonnegativeConeT(2 * n)],
             settings,
         )
         .expect("a program of fixed, matching sizes");
-        Ik { arm: Arm::new(), program }
+        Ik { robot: Arc::clone(robot), program }
     }
 
-    /// The arm's kinematics.
-    pub fn arm(&self) -> &Arm {
-        &self.arm
-    }
-
-    /// Joint angles near `seed` that put the tool at `target` (`world_from_tool`), fingers as in `seed` \[rad\].
+    /// Joint positions near `seed` that put the tool at `target` (`world_from_tool`), fingers as in `seed` \[rad, m\].
     ///
     /// # Errors
     /// [`Unreachable`]: how far the tool stayed away.
-    pub fn solve(&mut self, target: &Isometry3<f64>, seed: &[f64; JOINTS]) -> Result<[f64; JOINTS], Unreachable> {
+    pub fn solve<const N: usize>(&mut self, target: &Isometry3<f64>, seed: &[f64; N]) -> Result<[f64; N], Unreachable> {
         let mut q = *seed;
+        self.solve_in_place(target, &mut q).map(|()| q)
+    }
+
+    /// The same for any number of joints, in place of the seed.
+    ///
+    /// # Errors
+    /// As [`Ik::solve`].
+    pub fn solve_in_place(&mut self, target: &Isometry3<f64>, q: &mut [f64]) -> Result<(), Unreachable> {
         for _ in 0..MAX_STEPS {
-            let (tool, jacobian) = self.arm.tool_jacobian(&q);
+            let (tool, jacobian) = self.robot.tool_jacobian(q);
             let error = pose_error(&tool, target);
-            let Some(step) = self.step(&q, &jacobian, &error) else { break };
+            let Some(step) = self.step(q, &jacobian, &error) else { break };
             q.iter_mut().zip(&step).for_each(|(q, d)| *q += d);
             if step.iter().all(|d| d.abs() < CONVERGED_RAD) {
                 break;
             }
         }
-        let error = pose_error(&self.arm.tool_pose(&q), target);
+        let error = pose_error(&self.robot.tool_pose(q), target);
         let (position, rotation) = (error.fixed_rows::<3>(0).norm(), error.fixed_rows::<3>(3).norm());
         if position < POSITION_TOLERANCE_M && rotation < ROTATION_TOLERANCE_RAD {
-            return Ok(q);
+            return Ok(());
         }
         Err(Unreachable { target_m: target.translation.vector.into(), position_error_m: position, rotation_error_rad: rotation })
     }
 
-    /// One program: the step d that minimises |W (J d - e)|^2 + w (q4 + d4 - pi)^2 within position and velocity limits.
-    fn step(&mut self, q: &[f64; JOINTS], jacobian: &Matrix6<f64>, error: &Vector6<f64>) -> Option<[f64; ARM_JOINTS]> {
+    /// One program: the step d that minimises |W (J d - e)|^2 + w sum over the posture's joints i of (q_i + d_i - p_i)^2 within position and
+    /// velocity limits.
+    fn step(&mut self, q: &[f64], jacobian: &Jacobian, error: &Vector6<f64>) -> Option<Vec<f64>> {
         let lever = Vector6::new(1.0, 1.0, 1.0, ROTATION_LEVER_M, ROTATION_LEVER_M, ROTATION_LEVER_M);
-        let weighted = Matrix6::from_diagonal(&lever) * jacobian;
+        let n = self.robot.arm;
+        let mut weighted = jacobian.clone();
+        weighted.column_iter_mut().for_each(|mut column| column.component_mul_assign(&lever));
         let error = error.component_mul(&lever);
-        let mut cost = weighted.tr_mul(&weighted) + Matrix6::identity() * POSTURE_FLOOR;
+        let mut cost = weighted.tr_mul(&weighted) + DMatrix::identity(n, n) * POSTURE_FLOOR;
         let mut slope = -weighted.tr_mul(&error);
-        cost[(WRIST_ROLL, WRIST_ROLL)] += POSTURE_WEIGHT;
-        slope[WRIST_ROLL] += POSTURE_WEIGHT * (q[WRIST_ROLL] - WRIST_PLANE_RAD);
-        let mut limits = vec![0.0; 2 * ARM_JOINTS];
-        for i in 0..ARM_JOINTS {
-            let [low, high] = POSITION_LIMITS_RAD[i];
-            let reach = VELOCITY_LIMITS_RAD_S[i] * STEP_S;
+        for posture in &self.robot.posture {
+            let i = posture.joint;
+            cost[(i, i)] += POSTURE_WEIGHT;
+            slope[i] += POSTURE_WEIGHT * (q[i] - posture.position);
+        }
+        let mut limits = vec![0.0; 2 * n];
+        for (i, joint) in self.robot.joints[..n].iter().enumerate() {
+            let [low, high] = joint.limits;
+            let reach = joint.velocity * STEP_S;
             limits[i] = (high - q[i]).min(reach);
-            limits[ARM_JOINTS + i] = (q[i] - low).min(reach);
+            limits[n + i] = (q[i] - low).min(reach);
         }
         let untouched: [f64; 0] = [];
         self.program
@@ -132,7 +132,7 @@ impl Ik {
             .expect("the program keeps its structure");
         self.program.solve();
         match self.program.solution.status {
-            SolverStatus::Solved | SolverStatus::AlmostSolved => Some(std::array::from_fn(|i| self.program.solution.x[i])),
+            SolverStatus::Solved | SolverStatus::AlmostSolved => Some(self.program.solution.x.clone()),
             _ => None,
         }
     }
@@ -146,29 +146,30 @@ fn pose_error(from: &Isometry3<f64>, to: &Isometry3<f64>) -> Vector6<f64> {
 }
 
 /// Column starts and row indices of a dense upper triangle.
-fn upper_structure() -> (Vec<usize>, Vec<usize>) {
-    let columns = (0..=ARM_JOINTS).map(|j| j * (j + 1) / 2).collect();
-    let rows = (0..ARM_JOINTS).flat_map(|j| 0..=j).collect();
+fn upper_structure(n: usize) -> (Vec<usize>, Vec<usize>) {
+    let columns = (0..=n).map(|j| j * (j + 1) / 2).collect();
+    let rows = (0..n).flat_map(|j| 0..=j).collect();
     (columns, rows)
 }
 
 /// The upper triangle, column by column.
-fn upper_triangle(m: &Matrix6<f64>) -> Vec<f64> {
-    (0..ARM_JOINTS).flat_map(|j| (0..=j).map(move |i| m[(i, j)])).collect()
+fn upper_triangle(m: &DMatrix<f64>) -> Vec<f64> {
+    (0..m.ncols()).flat_map(|j| (0..=j).map(move |i| m[(i, j)])).collect()
 }
 
 /// d <= b above, -d <= b below.
-fn box_rows() -> CscMatrix<f64> {
-    let columns = (0..=ARM_JOINTS).map(|j| 2 * j).collect();
-    let rows = (0..ARM_JOINTS).flat_map(|j| [j, ARM_JOINTS + j]).collect();
-    let values = [1.0, -1.0].repeat(ARM_JOINTS);
-    CscMatrix::new(2 * ARM_JOINTS, ARM_JOINTS, columns, rows, values)
+fn box_rows(n: usize) -> CscMatrix<f64> {
+    let columns = (0..=n).map(|j| 2 * j).collect();
+    let rows = (0..n).flat_map(|j| [j, n + j]).collect();
+    let values = [1.0, -1.0].repeat(n);
+    CscMatrix::new(2 * n, n, columns, rows, values)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::robot::READY_Q_RAD;
+    use crate::robot::{READY_Q_RAD, built_in::jaco};
+    use crate::state::ARM_JOINTS;
     use nalgebra::{Translation3, UnitQuaternion};
 
     fn hand_down(x: f64, y: f64, z: f64, yaw: f64) -> Isometry3<f64> {
@@ -177,11 +178,11 @@ mod tests {
 
     #[test]
     fn reaches_what_forward_kinematics_confirms() {
-        let mut ik = Ik::new();
+        let mut ik = Ik::new(&jaco());
         for (x, y, z, yaw) in [(0.45, 0.0, 0.3, 0.0), (0.4, 0.1, 0.05, 0.3), (0.6, -0.12, 0.1, -0.4)] {
             let target = hand_down(x, y, z, yaw);
             let q = ik.solve(&target, &READY_Q_RAD).expect("within reach");
-            let tool = ik.arm().tool_pose(&q);
+            let tool = jaco().tool_pose(&q);
             assert!((tool.translation.vector - target.translation.vector).norm() < POSITION_TOLERANCE_M);
             assert!(tool.rotation.angle_to(&target.rotation) < ROTATION_TOLERANCE_RAD);
             assert_eq!(q[ARM_JOINTS..], READY_Q_RAD[ARM_JOINTS..]);
@@ -190,14 +191,14 @@ mod tests {
 
     #[test]
     fn says_how_far_it_stays_from_what_it_cannot_reach() {
-        let failure = Ik::new().solve(&hand_down(1.5, 0.0, 0.1, 0.0), &READY_Q_RAD).expect_err("beyond the arm's length");
+        let failure = Ik::new(&jaco()).solve(&hand_down(1.5, 0.0, 0.1, 0.0), &READY_Q_RAD).expect_err("beyond the arm's length");
         assert!(failure.position_error_m > 0.3, "{failure}");
         assert!(failure.to_string().contains("1.500"), "{failure}");
     }
 
     #[test]
     fn earlier_targets_leave_no_trace() {
-        let (mut fresh, mut used) = (Ik::new(), Ik::new());
+        let (mut fresh, mut used) = (Ik::new(&jaco()), Ik::new(&jaco()));
         let _ = used.solve(&hand_down(0.6, 0.1, 0.1, 0.5), &READY_Q_RAD);
         let target = hand_down(0.35, -0.1, 0.05, 0.0);
         assert_eq!(fresh.solve(&target, &READY_Q_RAD), used.solve(&target, &READY_Q_RAD));

@@ -12,13 +12,13 @@ use rand_chacha::ChaCha8Rng;
 pub struct Disturbance {
     settings: SimulateSettings,
     rng: ChaCha8Rng,
-    pulse: Pulse<ARM_JOINTS>,
+    pulse: Pulse,
 }
 
 impl Disturbance {
     /// Noise and pulses of one episode, drawn from `rng`.
     pub fn new(settings: &SimulateSettings, rng: ChaCha8Rng) -> Self {
-        Disturbance { settings: settings.clone(), rng, pulse: Pulse::default() }
+        Disturbance { settings: settings.clone(), rng, pulse: Pulse::new(ARM_JOINTS) }
     }
 
     /// Executed action \[rad/s\]: commanded + N(0, `noise_variance`) on all nine joints + the pulse on the arm, clamped to the joints'

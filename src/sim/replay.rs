@@ -10,7 +10,7 @@ use crate::pulse::Pulse;
 use crate::scene::Scene;
 use crate::seed::stream;
 use crate::state::{ARM_JOINTS, Action, FINGERS, JOINTS, State};
-use crate::tasks::Observation;
+use crate::tasks::{Observation, Task};
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 
@@ -24,7 +24,7 @@ impl Controller for Replay<'_> {
     fn command(&mut self, _seen: &Observation) -> Action {
         let mut command = self.commands.next().map_or([0.0; JOINTS], |c| std::array::from_fn(|i| f64::from(c[i])));
         if let Some(speeds) = self.fingers.as_mut().and_then(Excitation::advance) {
-            command[ARM_JOINTS..].copy_from_slice(&speeds);
+            command[ARM_JOINTS..].copy_from_slice(speeds);
         }
         command
     }
@@ -34,34 +34,34 @@ impl Controller for Replay<'_> {
 struct Excitation<'a> {
     settings: &'a FingerPulses,
     rng: ChaCha8Rng,
-    pulse: Pulse<FINGERS>,
+    pulse: Pulse,
 }
 
 impl Excitation<'_> {
     /// The next control step's commands \[rad/s\], unless they are the demo's.
-    fn advance(&mut self) -> Option<[f64; FINGERS]> {
+    fn advance(&mut self) -> Option<&[f64]> {
         let FingerPulses { probability, steps, speed_rad_s } = *self.settings;
         self.pulse.next((probability, steps), &mut self.rng, |rng| speed_rad_s * (2.0 * rng.random::<f64>() - 1.0))
     }
 }
 
-/// Runs the commands of `demo` from its start under disturbances drawn from `rng`, for as many steps as the demo has, now and then with
+/// Runs the commands of a demo of `task` from its start under disturbances drawn from `rng`, for as many steps as the demo has, now and then with
 /// other commands for the `fingers`. Friction and mass are drawn anew and obstacles taken from the settings: a dataset does not hold them.
 ///
 /// # Errors
 /// [`crate::error::Error::Interrupted`].
 pub fn reexecute(
     index: u64,
-    demo: &Demo,
+    (task, demo): (Task, &Demo),
     scene: &SceneSettings,
     settings: &SimulateSettings,
     fingers: &FingerPulses,
     mut rng: ChaCha8Rng,
     interrupt: &Interrupt,
 ) -> Result<Episode> {
-    let start = State::from_row(demo.task(), demo.state(0)).expect("a demo's rows have its task's length");
+    let start = State::from_row(task, demo.state(0)).expect("a demo of the task has rows of its length");
     let scene = Scene {
-        task: demo.task(),
+        task,
         block: start.block,
         context: start.context,
         obstacles: scene.obstacles.clone(),
@@ -70,7 +70,7 @@ pub fn reexecute(
     };
     let excitation = || {
         let rng = stream(rng.random(), "reexecute.fingers", index);
-        Excitation { settings: fingers, rng, pulse: Pulse::default() }
+        Excitation { settings: fingers, rng, pulse: Pulse::new(FINGERS) }
     };
     let fingers = (fingers.probability > 0.0).then(excitation);
     let mut replay = Replay { commands: demo.actions().chunks_exact(JOINTS), fingers };
@@ -85,7 +85,7 @@ mod tests {
     use crate::math::sin_cos;
     use crate::scene::Obstacle;
     use crate::sim::World;
-    use crate::tasks::{FailureClass, Task, draw_scene};
+    use crate::tasks::{FailureClass, draw_scene};
 
     #[test]
     fn commands_without_noise_lead_where_they_led_and_with_noise_elsewhere() {
@@ -99,12 +99,19 @@ mod tests {
             world.step(&std::array::from_fn(|i| f64::from(action[i])));
             states.extend(world.observe().state.to_row());
         }
-        let demo = Demo::new(Task::Stack, states, actions.clone(), actions).expect("lengths match");
+        let demo = Demo::new(&Task::Stack.layout(), states, actions.clone(), actions).expect("lengths match");
         let again = |noise_variance: f64| {
             let off = PulseSettings { probability: 0.0, ..PulseSettings::default() };
             let noise = SimulateSettings { noise_variance, pulses: off, ..SimulateSettings::default() };
-            let episode =
-                reexecute(0, &demo, &settings, &noise, &FingerPulses::default(), stream(4, "noise", 0), &Interrupt::default());
+            let episode = reexecute(
+                0,
+                (Task::Stack, &demo),
+                &settings,
+                &noise,
+                &FingerPulses::default(),
+                stream(4, "noise", 0),
+                &Interrupt::default(),
+            );
             let episode = episode.expect("not interrupted");
             let states = episode.to_demo().expect("a demo").states().to_vec();
             states.iter().zip(demo.states()).map(|(a, b)| (a - b).abs()).fold(0.0f32, f32::max)
@@ -121,10 +128,10 @@ mod tests {
         let start = World::new(&scene).observe().state.to_row();
         const STEPS: usize = 100;
         let (states, still) = (start.repeat(STEPS + 1), vec![0.0; STEPS * JOINTS]);
-        let demo = Demo::new(Task::PickUp, states, still.clone(), still).expect("lengths match");
+        let demo = Demo::new(&Task::PickUp.layout(), states, still.clone(), still).expect("lengths match");
         let episode = reexecute(
             0,
-            &demo,
+            (Task::PickUp, &demo),
             &settings,
             &SimulateSettings::default(),
             &FingerPulses::default(),
@@ -141,10 +148,11 @@ mod tests {
         const STEPS: usize = 60;
         let states = World::new(&scene).observe().state.to_row().repeat(STEPS + 1);
         let actions: Vec<f32> = (0..STEPS * JOINTS).map(|i| 0.01 * (i % JOINTS) as f32).collect();
-        let demo = Demo::new(Task::PickUp, states, actions.clone(), actions.clone()).expect("lengths match");
+        let demo = Demo::new(&Task::PickUp.layout(), states, actions.clone(), actions.clone()).expect("lengths match");
         let executed = |fingers: &FingerPulses, index: u64| -> Vec<f32> {
             let noise = SimulateSettings { noise_variance: 0.0, ..SimulateSettings::default() };
-            let episode = reexecute(index, &demo, &settings, &noise, fingers, stream(4, "noise", 0), &Interrupt::default());
+            let episode =
+                reexecute(index, (Task::PickUp, &demo), &settings, &noise, fingers, stream(4, "noise", 0), &Interrupt::default());
             episode.expect("not interrupted").to_demo().expect("a demo").executed().to_vec()
         };
         assert_eq!(executed(&FingerPulses::default(), 0), actions);

@@ -1,5 +1,6 @@
 //! What a task is: scene, spawn area, named success conditions, milestones of the reward and a dense one, failure classes. One file a task.
 
+mod layout;
 mod monitor;
 mod observation;
 pub mod pick_and_place;
@@ -9,6 +10,7 @@ mod spawn;
 pub mod stack;
 
 pub use crate::task::{FailureClass, Task};
+pub use layout::with_layout;
 pub use monitor::{Monitor, Verdict};
 pub use observation::Observation;
 pub use reward::dense;

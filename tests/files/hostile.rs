@@ -7,6 +7,7 @@ use hilt::error::Result;
 use hilt::interrupt::Interrupt;
 use hilt::learn::{Dynamics, Policy};
 use hilt::tasks::Task;
+use hilt::tasks::with_layout;
 use serde_json::{Value, json};
 use std::fs;
 use std::path::Path;
@@ -135,7 +136,21 @@ fn inspect_says_that_recordings_are_of_several_origins() {
 fn networks_of_hostile_descriptions_are_refused() {
     let path = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/fixtures/pick-up/policy.safetensors"));
     let (tensors, meta, origin) = weights::read(path, "policy").expect("the fixture");
-    for (key, value) in [("hidden", json!([0])), ("horizon_steps", json!(u32::MAX)), ("hidden", json!([1u64 << 62]))] {
+    let layout = |key: &str, value| {
+        let mut layout = meta["layout"].clone();
+        layout[key] = value;
+        layout
+    };
+    for (key, value) in [
+        ("hidden", json!([0])),
+        ("horizon_steps", json!(u32::MAX)),
+        ("hidden", json!([1u64 << 62])),
+        ("layout", json!("pick-up")),
+        ("layout", layout("period_s", json!(0))),
+        ("layout", layout("state", json!([]))),
+        ("layout", layout("aims", json!([{ "object": "block", "target": "block", "offset_m": [0, 0, 0] }]))),
+        ("layout", layout("arm", json!({ "joints": [], "tool_m": [0, 0, 0] }))),
+    ] {
         let mut hostile = meta.clone();
         hostile[key] = value;
         // Through a file, as it would come in.
@@ -145,4 +160,9 @@ fn networks_of_hostile_descriptions_are_refused() {
         assert!(message.contains(key), "{message}");
         assert!(Dynamics::from_tensors(&tensors, &meta).is_err());
     }
+    // A network of an older version does not say its layout, but its task.
+    let mut older = meta;
+    older.as_object_mut().expect("a table").remove("layout");
+    assert!(Policy::from_tensors(&tensors, &older).is_err());
+    Policy::from_tensors(&tensors, &with_layout(older)).expect("the task's layout");
 }

@@ -158,7 +158,7 @@ impl<F: FnMut(DatasetEpisode)> Rows<F> {
         let Episode { states, next, actions, executed, rewards, source } = &mut self.now;
         states.append(next);
         // Copies as long as the episode, where what they are copied from has room for the longest.
-        match Demo::new(self.task, states.as_slice().into(), actions.as_slice().into(), executed.as_slice().into()) {
+        match Demo::new(&self.task.layout(), states.as_slice().into(), actions.as_slice().into(), executed.as_slice().into()) {
             Ok(demo) => (self.see)(DatasetEpisode { source_index: *source, demo, rewards: rewards.as_slice().into(), success }),
             Err(what) => drop(self.wrong.get_or_insert_with(|| format!("episode {}: {what}", self.episodes))),
         }

@@ -14,7 +14,8 @@ const TASK: Task = Task::PickUp;
 fn episode(number: usize) -> DatasetEpisode {
     let steps = 3 + number % 4;
     let numbers = |n: usize| (0..n).map(|i| (i * i) as f32 * 0.01 - number as f32).collect::<Vec<f32>>();
-    let demo = Demo::new(TASK, numbers((steps + 1) * TASK.state_dim()), numbers(steps * JOINTS), numbers(steps * JOINTS));
+    let demo =
+        Demo::new(&TASK.layout(), numbers((steps + 1) * TASK.state_dim()), numbers(steps * JOINTS), numbers(steps * JOINTS));
     let demo = demo.expect("a demo");
     DatasetEpisode { source_index: 10 + number as u64, demo, rewards: vec![0.5; steps], success: true }
 }

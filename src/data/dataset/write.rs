@@ -88,8 +88,9 @@ impl<'a> Content<'a> {
     fn check(&self, dir: &Path, episode: &DatasetEpisode, expected: usize) -> Result<()> {
         let (number, steps) = (episode.source_index, episode.demo.len());
         let wrong = |what: String| Err(Error::input(dir, what));
-        if episode.demo.task() != self.task {
-            return wrong(format!("episode {number} is of {}, the dataset of {}", episode.demo.task(), self.task));
+        let layout = episode.demo.layout();
+        if *layout != self.task.layout() {
+            return wrong(format!("episode {number} is of {}, the dataset of {}", layout.name, self.task));
         }
         if steps != expected {
             return wrong(format!("episode {number} has {steps} actions, {expected} were announced"));

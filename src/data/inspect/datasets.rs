@@ -16,7 +16,7 @@ pub(super) fn one(root: &Path) -> Result<Value> {
         lengths.push(episode.demo.len() as f64);
         successes += usize::from(episode.success);
         sources.push(episode.source_index);
-        states.add(episode.demo.states(), episode.demo.task().state_dim());
+        states.add(episode.demo.states(), episode.demo.layout().state_dim());
         actions.add(episode.demo.actions(), JOINTS);
         executed.add(episode.demo.executed(), JOINTS);
     })?;

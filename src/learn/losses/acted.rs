@@ -5,7 +5,6 @@ use super::policy_loss::Mixture;
 use super::shards;
 use crate::learn::models::{Policy, PolicySamples, Samples};
 use crate::nn::{Lanes, Pass, panels_of};
-use crate::state::JOINTS;
 use rayon::prelude::*;
 
 /// The policy's mean actions in the states of one batch, in shards, with the passes that they came from.
@@ -13,7 +12,7 @@ use rayon::prelude::*;
 pub struct Acted {
     shards: Vec<Shard>,
     active: usize,
-    /// Mean actions, standardised, rows x 9.
+    /// Mean actions, standardised, rows x A.
     mean: Vec<f32>,
 }
 
@@ -30,14 +29,14 @@ pub struct Shard {
 impl Acted {
     /// With room for batches of at most `most_rows` states.
     pub fn new(policy: &Policy, most_rows: usize) -> Self {
-        let rows = shards::most_rows(most_rows);
+        let (rows, dim) = (shards::most_rows(most_rows), policy.layout().action_dim());
         let shard = || {
-            let mut shard = Shard { mean: Vec::with_capacity(rows * JOINTS), ..Shard::default() };
+            let mut shard = Shard { mean: Vec::with_capacity(rows * dim), ..Shard::default() };
             shard.pass.provide(&policy.net, panels_of(rows));
             shard
         };
         let shards = (0..shards::MAX_SHARDS).map(|_| shard()).collect();
-        Acted { shards, active: 0, mean: Vec::with_capacity(most_rows * JOINTS) }
+        Acted { shards, active: 0, mean: Vec::with_capacity(most_rows * dim) }
     }
 
     /// pi_theta(s) of `rows`, transitions of the samples.
@@ -54,7 +53,7 @@ impl Acted {
             samples.write_inputs(&rows[part], &mut shard.pass.input);
             policy.net.forward(&mut shard.pass, 0..panels);
             shard.mean.clear();
-            shard.mean.resize(shard.rows * JOINTS, 0.0);
+            shard.mean.resize(shard.rows * policy.action_scaling().width(), 0.0);
             shard.pass.output.read_rows(&mut shard.mean);
         });
         self.mean.clear();
@@ -66,7 +65,7 @@ impl Acted {
         &self.shards[..self.active]
     }
 
-    /// Mean actions of the last batch, standardised, rows x 9.
+    /// Mean actions of the last batch, standardised, rows x A.
     pub fn mean(&self) -> &[f32] {
         &self.mean
     }

@@ -8,7 +8,6 @@ use crate::learn::models::{PolicySamples, Samples, row};
 use crate::math::exp_f32;
 use crate::nn::{BLOCK_PANELS, LANES, Lanes, Panels, gaussian, panels_of};
 use crate::seed::normal;
-use crate::state::JOINTS;
 use rand::Rng;
 use rayon::prelude::*;
 
@@ -47,6 +46,7 @@ pub struct Workspace {
     loss: PolicyLoss,
     parts: Vec<Part>,
     noise: Vec<f32>,
+    residual2: Vec<f32>,
 }
 
 /// What one shard adds to the sums.
@@ -55,17 +55,27 @@ struct Part {
     noise: Panels,
     loss: f64,
     agreement: f64,
-    residual2: [f32; JOINTS],
-    d_log_std: [f32; JOINTS],
+    /// Of each entry of the actions, as what follows.
+    residual2: Vec<f32>,
+    d_log_std: Vec<f32>,
+    sigma: Vec<f32>,
+    weight: Vec<f32>,
+    eps: Vec<f32>,
 }
 
 impl Workspace {
-    /// With room for batches of at most `most_rows` state-action pairs.
-    pub fn new(most_rows: usize) -> Self {
-        let mut parts: Vec<Part> = (0..shards::MAX_SHARDS).map(|_| Part::default()).collect();
-        parts.iter_mut().for_each(|part| part.noise.provide(JOINTS, panels_of(shards::most_rows(most_rows))));
-        let noise = Vec::with_capacity(most_rows * JOINTS);
-        Workspace { loss: PolicyLoss::new("L_BC (Eq. 3)", most_rows), parts, noise }
+    /// For actions of `dim` entries, with room for batches of at most `most_rows` state-action pairs.
+    pub fn new(dim: usize, most_rows: usize) -> Self {
+        let part = || {
+            let zeros = || vec![0.0; dim];
+            let [residual2, d_log_std, sigma, weight, eps] = std::array::from_fn(|_| zeros());
+            let mut part = Part { residual2, d_log_std, sigma, weight, eps, ..Part::default() };
+            part.noise.provide(dim, panels_of(shards::most_rows(most_rows)));
+            part
+        };
+        let parts = (0..shards::MAX_SHARDS).map(|_| part()).collect();
+        let (noise, residual2) = (Vec::with_capacity(most_rows * dim), vec![0.0; dim]);
+        Workspace { loss: PolicyLoss::new("L_BC (Eq. 3)", dim, most_rows), parts, noise, residual2 }
     }
 }
 
@@ -78,35 +88,37 @@ pub fn behavior_cloning<'a>(
     rng: &mut impl Rng,
     work: &'a mut Workspace,
 ) -> (&'a PolicyLoss, f64) {
-    let (rows, Workspace { loss, parts, noise }) = (batch.rows.len(), work);
+    let (rows, Workspace { loss, parts, noise, residual2 }) = (batch.rows.len(), work);
+    let dim = residual2.len();
     let sampled = choices.action == ActionChoice::Sample || choices.convergence == Convergence::SampledDensity;
-    draw_noise(sampled, rows, rng, noise);
+    draw_noise(sampled, rows * dim, rng, noise);
     loss.begin(rows);
     let count = acted.shards().len();
     let shards = acted.shards().par_iter().zip(&mut parts[..count]).zip(&mut loss.d_mean[..count]);
     shards.enumerate().for_each(|(i, ((shard, part), d_mean))| {
         let range = shards::range(rows, count, i);
-        let eps = if sampled { &noise[range.start * JOINTS..range.end * JOINTS] } else { &[] };
+        let eps = if sampled { &noise[range.start * dim..range.end * dim] } else { &[] };
         part.losses(shard, batch, &batch.rows[range], eps, choices, d_mean);
     });
-    let (mut d_conv, mut residual2) = (0.0, [0.0f32; JOINTS]);
+    let mut d_conv = 0.0;
+    residual2.fill(0.0);
     for part in &parts[..count] {
         loss.value += part.loss;
         d_conv += part.agreement / rows as f64;
-        shards::add_scaled(&mut residual2, &part.residual2, 1.0 / rows as f32);
+        shards::add_scaled(residual2, &part.residual2, 1.0 / rows as f32);
         shards::add_scaled(&mut loss.d_log_std, &part.d_log_std, 1.0);
     }
     if choices.action == ActionChoice::Mean {
-        gaussian::add_nll_gradient(&batch.samples.policy.log_std, &residual2, &mut loss.d_likelihood);
+        gaussian::add_nll_gradient(&batch.samples.policy.log_std, residual2, &mut loss.d_likelihood);
     }
     (loss, d_conv)
 }
 
-/// Draws rows x 9 standard normal numbers, or none.
-pub fn draw_noise(wanted: bool, rows: usize, rng: &mut impl Rng, noise: &mut Vec<f32>) {
+/// Draws so many standard normal numbers, or none.
+pub fn draw_noise(wanted: bool, count: usize, rng: &mut impl Rng, noise: &mut Vec<f32>) {
     noise.clear();
     if wanted {
-        noise.extend((0..rows * JOINTS).map(|_| normal(rng) as f32));
+        noise.extend((0..count).map(|_| normal(rng) as f32));
     }
 }
 
@@ -115,35 +127,43 @@ impl Part {
     fn losses(&mut self, shard: &Shard, batch: Batch, rows: &[usize], noise: &[f32], choices: &Choices, d_mean: &mut Panels) {
         let policy = batch.samples.policy;
         let unit = &policy.action_scaling().std;
-        let sigma: [f32; JOINTS] = std::array::from_fn(|i| exp_f32(policy.log_std[i]));
+        let dim = unit.len();
+        self.sigma.iter_mut().zip(&policy.log_std).for_each(|(sigma, log_std)| *sigma = exp_f32(*log_std));
         // L_BC = scale * sum over rows and entries of weight_i * (standardised error)^2
-        let (weight, scale): ([f32; JOINTS], f32) = match choices.objective {
-            Objective::RawSum => (std::array::from_fn(|i| unit[i] * unit[i]), 1.0 / batch.demos as f32),
-            Objective::StandardisedMean => ([1.0; JOINTS], 1.0 / (batch.rows.len() * JOINTS) as f32),
+        let scale = match choices.objective {
+            Objective::RawSum => {
+                self.weight.iter_mut().zip(unit).for_each(|(weight, unit)| *weight = unit * unit);
+                1.0 / batch.demos as f32
+            }
+            Objective::StandardisedMean => {
+                self.weight.fill(1.0);
+                1.0 / (batch.rows.len() * dim) as f32
+            }
         };
         let sampled = choices.action == ActionChoice::Sample;
         (self.loss, self.agreement) = (0.0, 0.0);
-        (self.residual2, self.d_log_std) = ([0.0; JOINTS], [0.0; JOINTS]);
+        self.residual2.fill(0.0);
+        self.d_log_std.fill(0.0);
         for (p, rows) in rows.chunks(LANES).enumerate() {
             batch.samples.write_targets(rows, d_mean.panel_mut(p));
         }
         d_mean.clear_tail(rows.len());
         if !noise.is_empty() {
-            self.noise.reserve(JOINTS, panels_of(rows.len()));
-            self.noise.write_rows(0, rows.len(), |slot| row(noise, JOINTS, slot));
+            self.noise.reserve(dim, panels_of(rows.len()));
+            self.noise.write_rows(0, rows.len(), |slot| row(noise, dim, slot));
         }
         for (p, rows) in rows.chunks(LANES).enumerate() {
             let (mut loss, mut error2) = (Lanes::default(), Lanes::default());
-            for i in 0..JOINTS {
+            for i in 0..dim {
                 let (label, mut mean) = (&mut d_mean.panel_mut(p)[i], shard.pass.output.panel(p)[i]);
                 if rows.len() < LANES {
                     mean.take_from(rows.len(), *label); // no error where there is no row
                 }
                 let residual = mean - *label;
-                let shift = if sampled { self.noise.panel(p)[i] * sigma[i] } else { Lanes::default() };
+                let shift = if sampled { self.noise.panel(p)[i] * self.sigma[i] } else { Lanes::default() };
                 let error = residual + shift;
-                let slope = error * (2.0 * scale * weight[i]);
-                loss += error * weight[i] * error;
+                let slope = error * (2.0 * scale * self.weight[i]);
+                loss += error * self.weight[i] * error;
                 error2 += residual * residual;
                 self.residual2[i] += (residual * residual).sum();
                 self.d_log_std[i] += (slope * shift).sum();
@@ -153,11 +173,11 @@ impl Part {
             for lane in 0..rows.len() {
                 self.agreement += match choices.convergence {
                     Convergence::SampledDensity => {
-                        let eps: [f32; JOINTS] = std::array::from_fn(|i| self.noise.panel(p)[i].0[lane]);
-                        gaussian::sample_density(&policy.log_std, unit, &eps)
+                        self.eps.iter_mut().zip(self.noise.panel(p)).for_each(|(eps, noise)| *eps = noise.0[lane]);
+                        gaussian::sample_density(&policy.log_std, unit, &self.eps)
                     }
                     Convergence::Agreement => {
-                        f64::from(exp_f32(-0.5 * error2.0[lane] / (JOINTS as f32 * choices.tau * choices.tau)))
+                        f64::from(exp_f32(-0.5 * error2.0[lane] / (dim as f32 * choices.tau * choices.tau)))
                     }
                 };
             }
@@ -165,10 +185,11 @@ impl Part {
     }
 }
 
-/// L_BC over any number of pairs in the memory of a few, and the mean actions there (standardised, rows x 9); without a gradient.
+/// L_BC over any number of pairs in the memory of a few, and the mean actions there (standardised, rows x A); without a gradient.
 pub fn validate(batch: Batch, choices: &Choices, rng: &mut impl Rng) -> (f64, Vec<f32>) {
-    let (mut acted, mut work) = (Acted::default(), Workspace::new(VALIDATION_ROWS));
-    let (mut l_bc, mut mean) = (0.0, Vec::with_capacity(batch.rows.len() * JOINTS));
+    let dim = batch.samples.policy.layout().action_dim();
+    let (mut acted, mut work) = (Acted::default(), Workspace::new(dim, VALIDATION_ROWS));
+    let (mut l_bc, mut mean) = (0.0, Vec::with_capacity(batch.rows.len() * dim));
     for rows in batch.rows.chunks(VALIDATION_ROWS) {
         let share = rows.len() as f64 / batch.rows.len() as f64;
         acted.forward(batch.samples, rows);

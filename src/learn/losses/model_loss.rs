@@ -3,7 +3,6 @@
 use super::regression::{Loss, Regression};
 use crate::config::ModelLoss;
 use crate::learn::models::{Corpus, Dynamics, ModelSamples};
-use crate::state::BASE_DIM;
 
 /// L_model and its gradient for one network.
 pub struct ModelLearner {
@@ -17,7 +16,7 @@ impl ModelLearner {
     pub fn new(dynamics: &Dynamics) -> Self {
         let weights = match dynamics.settings().loss {
             ModelLoss::RawSum => dynamics.residual_scaling().std.iter().map(|s| s * s).collect(),
-            _ => vec![1.0; BASE_DIM],
+            _ => vec![1.0; dynamics.layout().changing()],
         };
         ModelLearner { weights, work: Regression::default() }
     }
@@ -37,7 +36,7 @@ impl ModelLearner {
         let kind = dynamics.settings().loss;
         let scale = match kind {
             ModelLoss::RawSum => corpus.mean_length() as f32 / rows.len() as f32,
-            _ => 1.0 / (rows.len() * BASE_DIM) as f32,
+            _ => 1.0 / (rows.len() * self.weights.len()) as f32,
         };
         let loss = Loss { weights: &self.weights, scale, huber: kind == ModelLoss::StandardisedHuber };
         self.work.loss(&dynamics.net, &ModelSamples { corpus, dynamics }, rows, &loss, learn)

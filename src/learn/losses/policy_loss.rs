@@ -2,7 +2,6 @@
 
 use super::shards;
 use crate::nn::{Lanes, Panels, panels_of};
-use crate::state::JOINTS;
 use std::ops::{Add, Mul};
 
 /// A loss, and its gradient in parts: what it sends back to the mean actions in the demos' states goes through the policy's network in
@@ -18,27 +17,30 @@ pub struct PolicyLoss {
     /// Gradient with respect to the network's parameters on other ways than those actions; empty when there are none.
     pub d_params: Vec<f32>,
     /// Gradient with respect to the log standard deviations.
-    pub d_log_std: [f32; JOINTS],
+    pub d_log_std: Vec<f32>,
     /// Gradient of the likelihood that teaches the log standard deviations where the loss does not: no weight mixes it away.
-    pub d_likelihood: [f32; JOINTS],
+    pub d_likelihood: Vec<f32>,
 }
 
 impl PolicyLoss {
-    /// Of this name, with room for batches of at most `most_rows` states.
-    pub fn new(name: &'static str, most_rows: usize) -> Self {
-        let mut loss = PolicyLoss { name, ..PolicyLoss::default() };
+    /// Of this name, for actions of `dim` entries, with room for batches of at most `most_rows` states.
+    pub fn new(name: &'static str, dim: usize, most_rows: usize) -> Self {
+        let (d_log_std, d_likelihood) = (vec![0.0; dim], vec![0.0; dim]);
+        let mut loss = PolicyLoss { name, d_log_std, d_likelihood, ..PolicyLoss::default() };
         loss.d_mean.resize_with(shards::MAX_SHARDS, Panels::default);
-        loss.d_mean.iter_mut().for_each(|d| d.provide(JOINTS, panels_of(shards::most_rows(most_rows))));
+        loss.d_mean.iter_mut().for_each(|d| d.provide(dim, panels_of(shards::most_rows(most_rows))));
         loss
     }
 
     /// No gradient yet, for a batch of `rows` states.
     pub fn begin(&mut self, rows: usize) {
-        (self.value, self.d_log_std, self.d_likelihood) = (0.0, [0.0; JOINTS], [0.0; JOINTS]);
+        self.value = 0.0;
+        self.d_log_std.fill(0.0);
+        self.d_likelihood.fill(0.0);
         let count = shards::count(rows);
         for (i, d_mean) in self.d_mean[..count].iter_mut().enumerate() {
             let panels = panels_of(shards::range(rows, count, i).len());
-            d_mean.reserve(JOINTS, panels);
+            d_mean.reserve(self.d_log_std.len(), panels);
             d_mean.span_mut(&(0..panels)).fill(Lanes::default());
         }
     }
@@ -80,14 +82,13 @@ impl<'a> Mixture<'a> {
         self.terms().map(|(weight, loss)| weight * loss.value).sum()
     }
 
-    /// Gradient with respect to the log standard deviations.
-    pub fn d_log_std(self) -> [f32; JOINTS] {
-        let mut sum = [0.0; JOINTS];
+    /// Writes the gradient with respect to the log standard deviations into `sum`.
+    pub fn d_log_std(self, sum: &mut [f32]) {
+        sum.fill(0.0);
         for (weight, loss) in self.terms() {
-            shards::add_scaled(&mut sum, &loss.d_log_std, weight as f32);
-            shards::add_scaled(&mut sum, &loss.d_likelihood, 1.0);
+            shards::add_scaled(sum, &loss.d_log_std, weight as f32);
+            shards::add_scaled(sum, &loss.d_likelihood, 1.0);
         }
-        sum
     }
 }
 
@@ -97,11 +98,13 @@ mod tests {
 
     #[test]
     fn a_mixture_weighs_value_and_gradient_but_not_the_likelihood() {
-        let of = |value, d: f32| PolicyLoss { value, d_log_std: [d; JOINTS], d_likelihood: [1.0; JOINTS], ..Default::default() };
+        let of = |value, d: f32| PolicyLoss { value, d_log_std: vec![d; 2], d_likelihood: vec![1.0; 2], ..Default::default() };
         let (bc, sc) = (of(2.0, 4.0), of(10.0, 8.0));
         let mixed = 0.75 * &bc + 0.25 * 2.0 * &sc;
         assert_eq!(mixed.value(), 0.75 * 2.0 + 0.5 * 10.0);
-        assert_eq!(mixed.d_log_std(), [0.75 * 4.0 + 0.5 * 8.0 + 2.0; JOINTS]);
+        let mut d_log_std = [7.0; 2];
+        mixed.d_log_std(&mut d_log_std);
+        assert_eq!(d_log_std, [0.75 * 4.0 + 0.5 * 8.0 + 2.0; 2]);
         assert_eq!((1.0 * &bc).value(), 2.0);
     }
 }

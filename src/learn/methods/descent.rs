@@ -31,6 +31,7 @@ pub struct Descent {
     net: Optimizer,
     std: Optimizer,
     gradient: Vec<f32>,
+    d_log_std: Vec<f32>,
     /// Largest norm of the gradient; 0 = no limit.
     clip_norm: f64,
     log_std_floor: f32,
@@ -56,6 +57,7 @@ impl Descent {
             net: Optimizer::new(policy.net.params(), settings.ema_decay),
             std: Optimizer::new(&policy.log_std, settings.ema_decay),
             gradient: vec![0.0; policy.net.params().len()],
+            d_log_std: vec![0.0; policy.log_std.len()],
             clip_norm: settings.clip_norm,
             log_std_floor: ln(settings.std_floor) as f32,
             ema_decay: settings.ema_decay,
@@ -94,23 +96,26 @@ impl Descent {
         self.updates += 1;
         acted.gradient(&self.policy, l_mix, &mut self.gradient);
         let norm = clip_by_global_norm(&mut self.gradient, self.clip_norm);
-        let d_log_std = l_mix.d_log_std();
+        l_mix.d_log_std(&mut self.d_log_std);
         let too_long = self.clip_norm == 0.0 && norm > LARGEST_NORM;
-        if !norm.is_finite() || too_long || !usable(&d_log_std) {
+        if !norm.is_finite() || too_long || !usable(&self.d_log_std) {
             self.skipped += 1;
             self.left_out = self.unusable(acted, l_mix);
             return;
         }
         self.net.step(&mut self.policy.net.params_mut(), &self.gradient, learning_rate);
         self.net.average(self.policy.net.params());
-        self.std.step(&mut self.policy.log_std, &d_log_std, learning_rate);
+        self.std.step(&mut self.policy.log_std, &self.d_log_std, learning_rate);
         gaussian::floor_log_std(&mut self.policy.log_std, self.log_std_floor);
         self.std.average(&self.policy.log_std);
     }
 
     /// The loss whose gradient is no use.
     fn unusable(&mut self, acted: &mut Acted, l_mix: Mixture) -> &'static str {
-        let mut unusable = |alone| !(self.gradient_norm(acted, alone) <= LARGEST_NORM && usable(&alone.d_log_std()));
+        let mut unusable = |alone: Mixture| {
+            alone.d_log_std(&mut self.d_log_std);
+            !(self.gradient_norm(acted, alone) <= LARGEST_NORM && usable(&self.d_log_std))
+        };
         let culprit = l_mix.terms().find(|(_, loss)| unusable(1.0 * *loss)).or_else(|| l_mix.terms().last());
         culprit.map_or("", |(_, loss)| loss.name)
     }
@@ -134,7 +139,7 @@ impl Descent {
         }
         let (net, std) = (self.policy.net.params().len(), self.policy.log_std.len());
         self.policy.net.params_mut().copy_from_slice(&reader.tensor(NET, &[net])?);
-        self.policy.log_std = reader.log_std(STD)?;
+        self.policy.log_std = reader.log_std(STD, self.policy.log_std.len())?;
         self.net = Optimizer::restore(reader, NET, net, self.ema_decay, counts.net)?;
         self.std = Optimizer::restore(reader, STD, std, self.ema_decay, counts.std)?;
         (self.updates, self.skipped) = (counts.updates, counts.skipped);

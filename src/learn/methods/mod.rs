@@ -137,3 +137,21 @@ pub fn train(
 ) -> Result<Trained> {
     run(imitator(method, inputs, dynamics, settings, seed)?, settings, hooks)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::config::{FeatureSet, ScSettings};
+
+    #[test]
+    fn state_cloning_alone_sees_what_its_own_key_says_and_learns_as_long_as_a_warm_start() {
+        let sc = ScSettings { features: FeatureSet::FkNear, ..Default::default() };
+        let settings = TrainSettings { features: FeatureSet::Fk, sc, min_updates: 10, ..Default::default() };
+        let own = MethodName::Sc.own_settings(&settings);
+        assert_eq!((own.features, own.warm_start_updates), (FeatureSet::FkNear, 0));
+        assert_eq!((own.min_updates, own.learning_rate), (settings.warm_start_updates, settings.warm_start_learning_rate));
+        for method in [MethodName::Hil, MethodName::Bc, MethodName::Ppo, MethodName::BcRl] {
+            assert_eq!(method.own_settings(&settings), settings);
+        }
+    }
+}

@@ -2,10 +2,10 @@
 
 use super::fine_tuning::FineTuning;
 use crate::error::{Error, Result};
+use crate::layout::Layout;
 use crate::learn::losses::behavior_cloning::{self as bc, Batch, Choices};
-use crate::learn::models::{Corpus, Policy, PolicySamples, row};
+use crate::learn::models::{Corpus, Policy, PolicySamples};
 use crate::learn::run::EpochMetrics;
-use crate::state::{ARM_JOINTS, JOINTS};
 use rand::Rng;
 
 /// Labelled finger velocity above which the hand closes or holds, and below whose negative it opens \[rad/s\].
@@ -14,9 +14,9 @@ const FINGER_COMMAND_RAD_S: f32 = 0.2;
 /// Root mean square error of the mean action on the validation demos \[rad/s\].
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct ActionError {
-    /// The six arm joints.
+    /// What drives the arm, or all, where nothing is known to drive fingers.
     arm: f64,
-    /// The three fingers.
+    /// What drives the fingers.
     fingers: f64,
 }
 
@@ -38,7 +38,7 @@ pub fn validate(
     let scaling = policy.action_scaling();
     let label = |r: usize, i: usize| scaling.apply(i, held_out.commanded(r)[i]);
     let classes = ["opening", "still", "closing"].into_iter();
-    for (class, error) in classes.zip(action_errors(label, &mean, &scaling.std, &scaling.mean)) {
+    for (class, error) in classes.zip(action_errors(&held_out.layout, label, &mean, (&scaling.std, &scaling.mean))) {
         metrics.set(&format!("arm_error_{class}_rad_s"), error.arm);
         metrics.set(&format!("finger_error_{class}_rad_s"), error.fingers);
     }
@@ -60,35 +60,45 @@ fn check(term: &str, value: f64, row: &EpochMetrics, remedy: &str) -> Result<()>
     Err(Error::Failed(format!("{term} on the validation demos is {value} after {place} (update {updates}): {remedy}")))
 }
 
-/// Errors of mean actions (standardised, rows x 9) against entry i of the label of row r, by what the labelled fingers do.
-fn action_errors(label: impl Fn(usize, usize) -> f32, mean: &[f32], unit: &[f32], offset: &[f32]) -> [ActionError; 3] {
+/// Errors of mean actions (standardised, rows x A) against entry i of the label of row r, by what the labelled fingers do; `unit` and
+/// `offset` undo the standardisation.
+fn action_errors(
+    layout: &Layout,
+    label: impl Fn(usize, usize) -> f32,
+    mean: &[f32],
+    (unit, offset): (&[f32], &[f32]),
+) -> [ActionError; 3] {
+    let (dim, fingers) = (layout.action_dim(), layout.fingers());
+    let others = || (0..dim).filter(|i| !fingers.contains(i));
     let mut sums = [[0.0f64; 3]; 3]; // arm, fingers, rows
-    for r in 0..mean.len() / JOINTS {
-        let (label, mean): ([f32; JOINTS], _) = (std::array::from_fn(|i| label(r, i)), row(mean, JOINTS, r));
-        let fingers = (ARM_JOINTS..JOINTS).map(|i| offset[i] + unit[i] * label[i]).sum::<f32>() / (JOINTS - ARM_JOINTS) as f32;
-        let class = 1 + usize::from(fingers > FINGER_COMMAND_RAD_S) - usize::from(fingers < -FINGER_COMMAND_RAD_S);
-        let square = |i: usize| f64::from(unit[i] * (mean[i] - label[i])).powi(2);
-        sums[class][0] += (0..ARM_JOINTS).map(square).sum::<f64>();
-        sums[class][1] += (ARM_JOINTS..JOINTS).map(square).sum::<f64>();
+    for (r, mean) in mean.chunks_exact(dim).enumerate() {
+        let closing = fingers.clone().map(|i| offset[i] + unit[i] * label(r, i)).sum::<f32>() / fingers.len().max(1) as f32;
+        let class = 1 + usize::from(closing > FINGER_COMMAND_RAD_S) - usize::from(closing < -FINGER_COMMAND_RAD_S);
+        let square = |i: usize| f64::from(unit[i] * (mean[i] - label(r, i))).powi(2);
+        sums[class][0] += others().map(square).sum::<f64>();
+        sums[class][1] += fingers.clone().map(square).sum::<f64>();
         sums[class][2] += 1.0;
     }
-    sums.map(|[arm, fingers, rows]| ActionError {
-        arm: (arm / (rows * ARM_JOINTS as f64)).sqrt(),
-        fingers: (fingers / (rows * (JOINTS - ARM_JOINTS) as f64)).sqrt(),
+    sums.map(|[arm, fingers_sum, rows]| ActionError {
+        arm: (arm / (rows * others().count() as f64)).sqrt(),
+        fingers: (fingers_sum / (rows * fingers.len() as f64)).sqrt(),
     })
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::learn::tests::testing::Toy;
 
     #[test]
     fn errors_go_to_the_class_of_the_labelled_fingers() {
-        let mut targets = vec![0.0; 2 * JOINTS];
-        targets[ARM_JOINTS..JOINTS].fill(0.8);
+        let layout = Toy::Stack.layout();
+        let dim = layout.action_dim();
+        let mut targets = vec![0.0; 2 * dim];
+        targets[layout.fingers()].fill(0.8);
         let mut mean = targets.clone();
-        (0..ARM_JOINTS).for_each(|i| mean[i] += 0.1);
-        let errors = action_errors(|r, i| targets[r * JOINTS + i], &mean, &[2.0; JOINTS], &[0.0; JOINTS]);
+        layout.arm().for_each(|i| mean[i] += 0.1);
+        let errors = action_errors(&layout, |r, i| targets[r * dim + i], &mean, (&vec![2.0; dim], &vec![0.0; dim]));
         assert!((errors[2].arm - 0.2).abs() < 1e-6 && errors[2].fingers == 0.0);
         assert!(errors[1].arm == 0.0 && errors[0].arm.is_nan());
     }

@@ -1,10 +1,8 @@
 //! The hand's pose from the arm's joint angles in f32, with what its derivative needs: per joint, axis and origin in the world. Eight
 //! states at a time.
 
+use crate::layout::{Chain, MOST_ARM_JOINTS};
 use crate::nn::Lanes;
-use crate::robot::jaco::TOOL_IN_HAND_M;
-use crate::robot::kinematics::Arm;
-use crate::state::ARM_JOINTS;
 use std::f32::consts::FRAC_2_PI;
 
 /// Eight vectors.
@@ -18,47 +16,43 @@ pub struct Hand {
     /// Columns of `world_from_hand`.
     pub columns: [Vec3; 3],
     /// World axis of each arm joint.
-    pub axes: [Vec3; ARM_JOINTS],
+    pub axes: [Vec3; MOST_ARM_JOINTS],
     /// World position of each arm joint \[m\].
-    pub origins: [Vec3; ARM_JOINTS],
+    pub origins: [Vec3; MOST_ARM_JOINTS],
+    /// Joints of the arm.
+    pub joints: usize,
 }
 
 /// The fixed transforms of the arm, in f32.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Chain {
-    rotations: [[[f32; 3]; 3]; ARM_JOINTS],
-    offsets: [[f32; 3]; ARM_JOINTS],
+pub struct Arm {
+    /// Columns of the rotation and origin of each joint's frame in the one before.
+    frames: Vec<([[f32; 3]; 3], [f32; 3])>,
+    tool: [f32; 3],
 }
 
-impl Default for Chain {
-    fn default() -> Self {
-        let arm = Arm::new();
-        let column = |i: usize, c: usize| {
-            let matrix = arm.origin(i).rotation.to_rotation_matrix();
-            std::array::from_fn(|r| matrix[(r, c)] as f32)
-        };
-        Chain {
-            rotations: std::array::from_fn(|i| std::array::from_fn(|c| column(i, c))),
-            offsets: std::array::from_fn(|i| std::array::from_fn(|r| arm.origin(i).translation.vector[r] as f32)),
-        }
+impl Arm {
+    /// In single precision.
+    pub fn new(chain: &Chain) -> Self {
+        let single = |v: [f64; 3]| v.map(|v| v as f32);
+        let frames = chain.joints.iter().map(|frame| (frame.columns.map(single), single(frame.origin_m)));
+        Arm { frames: frames.collect(), tool: single(chain.tool_m) }
     }
-}
 
-impl Chain {
-    /// The hand at joint angles `q` (the arm's six are read) \[rad\].
+    /// The hand at joint angles `q` (the arm's are read) \[rad\].
     pub fn hand(&self, q: &[Lanes]) -> Hand {
-        let mut hand = Hand::default();
+        let mut hand = Hand { joints: self.frames.len(), ..Hand::default() };
         (0..3).for_each(|i| hand.columns[i][i] = Lanes::splat(1.0));
         let mut position = Vec3::default();
-        for (i, angle) in q[..ARM_JOINTS].iter().enumerate() {
-            position = add(position, turn(&hand.columns, self.offsets[i].map(Lanes::splat)));
-            let [x, y, z] = self.rotations[i].map(|column| turn(&hand.columns, column.map(Lanes::splat)));
+        for (i, ((rotation, origin), angle)) in self.frames.iter().zip(q).enumerate() {
+            position = add(position, turn(&hand.columns, origin.map(Lanes::splat)));
+            let [x, y, z] = rotation.map(|column| turn(&hand.columns, column.map(Lanes::splat)));
             let (sin, cos) = sin_cos(*angle);
             hand.columns = [add(scale(x, cos), scale(y, sin)), sub(scale(y, cos), scale(x, sin)), z];
             hand.axes[i] = z;
             hand.origins[i] = position;
         }
-        hand.tool = add(position, turn(&hand.columns, TOOL_IN_HAND_M.map(|v| Lanes::splat(v as f32))));
+        hand.tool = add(position, turn(&hand.columns, self.tool.map(Lanes::splat)));
         hand
     }
 }
@@ -67,7 +61,7 @@ impl Hand {
     /// Adds to `d_q` the gradient that reaches the joints when a force `f` pulls at the tool point and a moment `m` turns the hand:
     /// joint i gets z_i . ((p - o_i) x f + m).
     pub fn add_joint_gradient(&self, f: Vec3, m: Vec3, d_q: &mut [Lanes]) {
-        for (i, d) in d_q[..ARM_JOINTS].iter_mut().enumerate() {
+        for (i, d) in d_q[..self.joints].iter_mut().enumerate() {
             let lever = sub(self.tool, self.origins[i]);
             *d += dot(self.axes[i], add(cross(lever, f), m));
         }
@@ -149,7 +143,9 @@ mod tests {
     use super::*;
     use crate::math;
     use crate::nn::LANES;
-    use crate::robot::jaco::READY_Q_RAD;
+    use crate::robot::{self, READY_Q_RAD};
+    use crate::state::ARM_JOINTS;
+    use crate::tasks::Task;
 
     #[test]
     fn sine_and_cosine_are_close() {
@@ -167,8 +163,9 @@ mod tests {
     fn the_hand_is_where_the_arms_own_kinematics_have_it() {
         // lane 5 holds the angles in question, the others something else
         let q = READY_Q_RAD.map(|v| v + 0.3);
-        let hand = Chain::default().hand(&q.map(|v| Lanes(std::array::from_fn(|l| v as f32 + 0.1 * (l as f32 - 5.0)))));
-        let (tool, jacobian) = Arm::new().tool_jacobian(&q);
+        let arm = Arm::new(Task::Stack.layout().arm.as_ref().expect("the arm is known"));
+        let hand = arm.hand(&q.map(|v| Lanes(std::array::from_fn(|l| v as f32 + 0.1 * (l as f32 - 5.0)))));
+        let (tool, jacobian) = robot::kinematics::Arm::new().tool_jacobian(&q);
         let matrix = tool.rotation.to_rotation_matrix();
         for r in 0..3 {
             assert!((f64::from(hand.tool[r].0[5]) - tool.translation.vector[r]).abs() < 1e-6);

@@ -13,12 +13,11 @@ mod scaling;
 mod weights;
 
 pub use corpus::{Corpus, row};
-pub use dynamics::{DT_S, Dynamics, STEP_FLOOR};
-pub use features::Features;
+pub use dynamics::{Dynamics, STEP_FLOOR};
+pub use features::{Features, derived_width};
 pub use hand::Hand;
 pub use model_report::{ModelReport, error_table};
 pub use policy::Policy;
-pub use relations::{Relations, derived_width, relations};
 pub use samples::{ModelSamples, PolicySamples, Samples};
 pub use scaling::Scaling;
 pub use weights::{Reader, vector};

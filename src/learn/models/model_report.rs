@@ -1,12 +1,12 @@
 //! How far the dynamics network is off on unseen demos, beside two models that know nothing.
 
 use super::corpus::Corpus;
-use super::dynamics::{DT_S, Dynamics};
+use super::dynamics::Dynamics;
 use crate::error::Result;
 use crate::interrupt::Interrupt;
+use crate::layout::{Holds, Layout};
 use crate::math::acos;
 use crate::nn::{LANES, Panels, Pass};
-use crate::state::{ARM_JOINTS, BASE_DIM, JOINTS};
 use crate::table::{Table, Values};
 use std::ops::Range;
 
@@ -22,15 +22,56 @@ pub struct ModelReport {
 
 /// Horizons of the report in control steps.
 const HORIZONS: [usize; 2] = [1, 10];
-/// State groups, their units, and their entries.
-const GROUPS: [(&str, &str, Range<usize>); 6] = [
-    ("arm_q", "rad", 0..ARM_JOINTS),
-    ("finger_q", "rad", ARM_JOINTS..JOINTS),
-    ("arm_dq", "rad/s", JOINTS..JOINTS + ARM_JOINTS),
-    ("finger_dq", "rad/s", JOINTS + ARM_JOINTS..2 * JOINTS),
-    ("block_position", "m", 2 * JOINTS..2 * JOINTS + 3),
-    ("block_rotation", "rad", 2 * JOINTS + 3..BASE_DIM),
-];
+
+/// Entries of a state that are judged together.
+struct Group {
+    name: String,
+    unit: &'static str,
+    entries: Range<usize>,
+    measure: Measure,
+}
+
+/// What the error of a group is.
+#[derive(Clone, Copy)]
+enum Measure {
+    /// Mean square of its entries.
+    Mean,
+    /// Square distance.
+    Distance,
+    /// Square angle between unit quaternions.
+    Angle,
+}
+
+/// The groups of a layout: joints of the arm and the fingers, positions and rotations of objects, and what else may change.
+fn groups(layout: &Layout) -> Vec<Group> {
+    let mut groups = Vec::new();
+    let mut push = |name: String, unit, entries: Range<usize>, measure| {
+        if !entries.is_empty() {
+            groups.push(Group { name, unit, entries, measure });
+        }
+    };
+    for (span, at) in layout.state_spans() {
+        let of = |part: Range<usize>| at.start + part.start..at.start + part.end;
+        let name = &span.name;
+        match span.holds {
+            Holds::JointPositions | Holds::JointVelocities => {
+                let unit = if span.holds == Holds::JointPositions { "rad" } else { "rad/s" };
+                let parts = [("arm", layout.arm()), ("finger", layout.fingers())];
+                if parts.iter().all(|(_, part)| part.is_empty()) {
+                    push(name.clone(), unit, at.clone(), Measure::Mean);
+                }
+                parts.into_iter().for_each(|(part, range)| push(format!("{part}_{name}"), unit, of(range), Measure::Mean));
+            }
+            Holds::Pose => {
+                push(format!("{name}_position"), "m", at.start..at.start + 3, Measure::Distance);
+                push(format!("{name}_rotation"), "rad", at.start + 3..at.end, Measure::Angle);
+            }
+            Holds::Numbers => push(name.clone(), "", at.clone(), Measure::Mean),
+            _ => {}
+        }
+    }
+    groups
+}
 
 #[derive(Clone, Copy)]
 enum Model {
@@ -44,18 +85,19 @@ enum Model {
 /// # Errors
 /// [`crate::error::Error::Interrupted`].
 pub fn error_table(dynamics: &Dynamics, corpus: &Corpus, interrupt: &Interrupt) -> Result<Table> {
-    let names = |pick: fn(&(&str, &str, Range<usize>)) -> String| Values::Text(GROUPS.iter().map(pick).collect());
-    let mut table = Table::default().with("group", "Entries of the state", names(|g| g.0.into())).with(
+    let groups = groups(&corpus.layout);
+    let names = |pick: fn(&Group) -> String| Values::Text(groups.iter().map(pick).collect());
+    let mut table = Table::default().with("group", "Entries of the state", names(|g| g.name.clone())).with(
         "unit",
         "Unit of the errors",
-        names(|g| g.1.into()),
+        names(|g| g.unit.into()),
     );
     for (name, model) in [("network", Model::Network), ("unchanged", Model::Unchanged), ("integrated", Model::Integrated)] {
         for steps in HORIZONS {
-            let errors = errors(dynamics, corpus, model, steps, interrupt)?;
+            let errors = errors(dynamics, corpus, model, (&groups, steps), interrupt)?;
             let plural = if steps == 1 { "step" } else { "steps" };
             let doc = format!("RMS error of the model \"{name}\" after {steps} control {plural}, open loop");
-            table = table.with(&format!("{name}_{steps}_{plural}"), &doc, Values::F64(errors.to_vec()));
+            table = table.with(&format!("{name}_{steps}_{plural}"), &doc, Values::F64(errors));
         }
     }
     Ok(table)
@@ -66,11 +108,11 @@ fn errors(
     dynamics: &Dynamics,
     corpus: &Corpus,
     model: Model,
-    steps: usize,
+    (groups, steps): (&[Group], usize),
     interrupt: &Interrupt,
-) -> Result<[f64; GROUPS.len()]> {
-    let dim = corpus.task.state_dim();
-    let (mut sums, mut count) = ([0.0f64; GROUPS.len()], 0usize);
+) -> Result<Vec<f64>> {
+    let dim = corpus.layout.state_dim();
+    let (mut sums, mut count) = (vec![0.0f64; groups.len()], 0usize);
     let mut pass = Pass::default();
     for demo in (0..corpus.demos()).map(|i| corpus.demo(i)).filter(|d| d.len() >= steps) {
         interrupt.check()?;
@@ -81,24 +123,25 @@ fn errors(
         }
         for (r, state) in states.chunks_exact(dim).enumerate() {
             let truth = corpus.next(demo.start + r + steps - 1);
-            sums.iter_mut().zip(&GROUPS).for_each(|(sum, group)| *sum += square_error(state, truth, group));
+            sums.iter_mut().zip(groups).for_each(|(sum, group)| *sum += square_error(state, truth, group));
         }
         count += rows;
     }
-    Ok(sums.map(|sum| (sum / count as f64).sqrt()))
+    Ok(sums.iter().map(|sum| (sum / count as f64).sqrt()).collect())
 }
 
 /// One step of all `states`; row r is given the executed action of transition `first + r`.
 fn advance(dynamics: &Dynamics, corpus: &Corpus, model: Model, first: usize, states: &mut [f32], pass: &mut Pass) {
-    let dim = corpus.task.state_dim();
+    let (layout, dim) = (&corpus.layout, corpus.layout.state_dim());
+    let (q, dq) = (layout.positions(), layout.velocities());
     let action = |r: usize| corpus.executed(first + r);
     match model {
         Model::Unchanged => {}
         Model::Integrated => {
             for (r, state) in states.chunks_exact_mut(dim).enumerate() {
-                for (i, a) in action(r).iter().enumerate() {
-                    state[i] += DT_S * a;
-                    state[JOINTS + i] = *a;
+                for (i, a) in action(r).iter().enumerate().take(q.len().max(dq.len())) {
+                    q.clone().nth(i).into_iter().for_each(|q| state[q] += dynamics.dt_s() * a);
+                    dq.clone().nth(i).into_iter().for_each(|dq| state[dq] = *a);
                 }
             }
         }
@@ -106,7 +149,7 @@ fn advance(dynamics: &Dynamics, corpus: &Corpus, model: Model, first: usize, sta
             pass.reserve(&dynamics.net, 1);
             let (mut panel, mut actions) = (Panels::default(), Panels::default());
             panel.reserve(dim, 1);
-            actions.reserve(JOINTS, 1);
+            actions.reserve(layout.action_dim(), 1);
             for (p, block) in states.chunks_mut(LANES * dim).enumerate() {
                 for (r, state) in block.chunks_exact(dim).enumerate() {
                     panel.write_row(r, state);
@@ -119,17 +162,17 @@ fn advance(dynamics: &Dynamics, corpus: &Corpus, model: Model, first: usize, sta
     }
 }
 
-/// Mean square over the entries of a joint group, square distance of a position, square angle of a rotation.
-fn square_error(state: &[f32], truth: &[f32], (name, _, entries): &(&str, &str, Range<usize>)) -> f64 {
+/// As the group is measured.
+fn square_error(state: &[f32], truth: &[f32], Group { entries, measure, .. }: &Group) -> f64 {
     let pairs = || entries.clone().map(|i| (f64::from(state[i]), f64::from(truth[i])));
     let sum = pairs().map(|(a, b)| (a - b).powi(2)).sum::<f64>();
-    match *name {
-        "block_position" => sum,
-        "block_rotation" => {
+    match measure {
+        Measure::Mean => sum / entries.len() as f64,
+        Measure::Distance => sum,
+        Measure::Angle => {
             let dot = |f: fn((f64, f64)) -> f64| pairs().map(f).sum::<f64>();
             let cos = dot(|(a, b)| a * b).abs() / (dot(|(a, _)| a * a) * dot(|(_, b)| b * b)).sqrt();
             (2.0 * acos(cos.min(1.0))).powi(2)
         }
-        _ => sum / entries.len() as f64,
     }
 }

@@ -6,14 +6,14 @@ use super::older;
 use super::scaling::Scaling;
 use super::weights::{Reader, push_features, push_network, push_scaling, vector};
 use crate::config::{MOST_STEPS, TrainSettings};
+use crate::layout::Layout;
 use crate::math::{exp_f32, ln};
 use crate::nn::{Lanes, Mlp, Pass};
 use crate::seed::normal;
-use crate::state::JOINTS;
-use crate::task::Task;
 use crate::tensor::NamedTensor;
 use rand::Rng;
 use serde_json::{Value, json};
+use std::sync::Arc;
 
 /// Spread of the demo actions below which they count as constant \[rad/s\].
 const ACTION_FLOOR_RAD_S: f32 = 0.01;
@@ -25,7 +25,6 @@ const MOST_HORIZON_STEPS: u32 = HORIZON_OVER_P95 as u32 * MOST_STEPS;
 /// pi_theta with everything needed to run it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Policy {
-    task: Task,
     horizon_steps: u32,
     features: Features,
     action: Scaling,
@@ -39,7 +38,8 @@ impl Policy {
     /// A policy with random weights; scalings and horizon from the training demos.
     pub(in crate::learn) fn new(corpus: &Corpus, settings: &TrainSettings, rng: &mut impl Rng) -> Self {
         let features = Features::fit(corpus, settings.features, settings.mask_dq);
-        let action = Scaling::fit(corpus.rows(), JOINTS, ACTION_FLOOR_RAD_S, |r, row| row.copy_from_slice(corpus.commanded(r)));
+        let dim = corpus.layout.action_dim();
+        let action = Scaling::fit(corpus.rows(), dim, ACTION_FLOOR_RAD_S, |r, row| row.copy_from_slice(corpus.commanded(r)));
         let mut lengths: Vec<usize> = (0..corpus.demos()).map(|i| corpus.demo(i).len()).collect();
         lengths.sort_unstable();
         let p95 = lengths[(lengths.len() * 95).div_ceil(100) - 1];
@@ -55,14 +55,13 @@ impl Policy {
         rng: &mut impl Rng,
     ) -> Self {
         let mut widths = vec![settings.hidden_units; settings.hidden_layers + 2];
-        (widths[0], widths[settings.hidden_layers + 1]) = (features.width(), JOINTS);
+        (widths[0], widths[settings.hidden_layers + 1]) = (features.width(), action.width());
         Policy {
-            task: features.task(),
             horizon_steps,
+            log_std: vec![ln(settings.initial_std.max(settings.std_floor)) as f32; action.width()],
             features,
             action,
             net: Mlp::new(&widths, settings.activation, rng),
-            log_std: vec![ln(settings.initial_std.max(settings.std_floor)) as f32; JOINTS],
             settings: settings.clone(),
         }
     }
@@ -72,9 +71,9 @@ impl Policy {
         self.features = features;
     }
 
-    /// The task it was trained on.
-    pub fn task(&self) -> Task {
-        self.task
+    /// What the rows that it was trained on hold.
+    pub fn layout(&self) -> &Arc<Layout> {
+        self.features.layout()
     }
 
     /// Control steps after which an episode is given up: twice the 95th percentile of the training demos' lengths.
@@ -95,32 +94,31 @@ impl Policy {
         &self.action
     }
 
-    /// Mean action in `state_row` (`task.state_dim()` numbers, see [`crate::state::State::to_row`]) \[rad/s\].
+    /// Mean action in `state_row`, in the units of the layout.
     ///
     /// # Panics
-    /// When the row is not the task's.
-    pub fn act(&self, state_row: &[f32]) -> [f32; JOINTS] {
-        let mean = self.mean(state_row);
-        std::array::from_fn(|i| self.action.undo(i, mean[i]))
+    /// When the row is not the layout's.
+    pub fn act(&self, state_row: &[f32]) -> Vec<f32> {
+        self.mean(state_row).enumerate().map(|(i, mean)| self.action.undo(i, mean)).collect()
     }
 
-    /// An action drawn from the Gaussian \[rad/s\].
+    /// An action drawn from the Gaussian, in the units of the layout.
     ///
     /// # Panics
-    /// When the row is not the task's.
-    pub fn sample(&self, state_row: &[f32], rng: &mut impl Rng) -> [f32; JOINTS] {
-        let mean = self.mean(state_row);
-        let noise: [f32; JOINTS] = std::array::from_fn(|_| normal(rng) as f32);
-        std::array::from_fn(|i| self.action.undo(i, mean[i] + exp_f32(self.log_std[i]) * noise[i]))
+    /// When the row is not the layout's.
+    pub fn sample(&self, state_row: &[f32], rng: &mut impl Rng) -> Vec<f32> {
+        let noisy = |(i, mean)| self.action.undo(i, mean + exp_f32(self.log_std[i]) * normal(rng) as f32);
+        self.mean(state_row).enumerate().map(noisy).collect()
     }
 
-    fn mean(&self, state_row: &[f32]) -> [f32; JOINTS] {
-        assert_eq!(state_row.len(), self.task.state_dim(), "the row of another task than {}", self.task);
+    fn mean(&self, state_row: &[f32]) -> impl Iterator<Item = f32> + use<> {
+        let (dim, name) = (self.layout().state_dim(), &self.layout().name);
+        assert_eq!(state_row.len(), dim, "the row of another task than {name}");
         let mut pass = Pass::new(&self.net, 1);
         let state: Vec<Lanes> = state_row.iter().map(|v| Lanes::splat(*v)).collect();
         self.features.forward(&state, &self.features.hand(&state), pass.input.panel_mut(0));
         self.net.forward(&mut pass, 0..1);
-        std::array::from_fn(|i| pass.output.get(0, i))
+        (0..self.action.width()).map(move |i| pass.output.get(0, i))
     }
 
     /// All arrays.
@@ -139,8 +137,9 @@ impl Policy {
         let widths = self.net.widths();
         json!({
             "network": "policy",
-            "task": self.task,
-            "state_dim": self.task.state_dim(),
+            "task": self.layout().name,
+            "state_dim": self.layout().state_dim(),
+            "layout": **self.layout(),
             "features": features,
             "mask_dq": mask_dq,
             "activation": self.net.activation(),
@@ -156,22 +155,21 @@ impl Policy {
     /// Says what is missing or does not fit, with both numbers.
     pub fn from_tensors(tensors: &[NamedTensor], meta: &Value) -> Result<Self, String> {
         let reader = Reader { tensors, meta };
-        let task = reader.task("policy")?;
+        let layout = reader.layout("policy")?;
         let horizon_steps: u32 = reader.meta("horizon_steps")?;
         if !(1..=MOST_HORIZON_STEPS).contains(&horizon_steps) {
             return Err(format!("\"horizon_steps\" of the description is {horizon_steps}; allowed: 1 to {MOST_HORIZON_STEPS}"));
         }
         let settings: TrainSettings = reader.settings(older::of_policy)?;
         settings.validate().map_err(|why| format!("its settings cannot have trained it: {why}"))?;
-        let features = reader.features("policy", task)?;
-        let net = reader.network("policy", features.width(), JOINTS)?;
+        let features = reader.features("policy", &layout)?;
+        let net = reader.network("policy", features.width(), layout.action_dim())?;
         Ok(Policy {
-            task,
             horizon_steps,
             features,
-            action: reader.scaling("policy.action", JOINTS)?,
+            action: reader.scaling("policy.action", layout.action_dim())?,
             net,
-            log_std: reader.log_std("policy.log_std")?,
+            log_std: reader.log_std("policy.log_std", layout.action_dim())?,
             settings,
         })
     }
@@ -180,12 +178,12 @@ impl Policy {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::learn::tests::testing::demos;
+    use crate::learn::tests::testing::{Toy, demos};
     use crate::seed::stream;
 
     #[test]
     fn a_policy_survives_its_tensors_and_refuses_wrong_ones() {
-        let corpus = Corpus::new(demos(Task::Stack, 3, 20, 0), "training").expect("demos");
+        let corpus = Corpus::new(demos(Toy::Stack, 3, 20, 0), "training").expect("demos");
         let policy = Policy::new(&corpus, &TrainSettings::default(), &mut stream(0, "test", 0));
         assert_eq!(policy.horizon_steps(), 44);
         let (tensors, meta) = (policy.to_tensors(), policy.meta());
@@ -193,9 +191,9 @@ mod tests {
 
         let refused = |tensors: &[NamedTensor], meta: &Value| Policy::from_tensors(tensors, meta).expect_err("refused");
         let mut other = meta.clone();
-        other["state_dim"] = json!(28);
+        other["state_dim"] = json!(20);
         let message = refused(&tensors, &other);
-        assert!(message.contains("28") && message.contains("32"), "{message}");
+        assert!(message.contains("20") && message.contains("28"), "{message}");
         let mut cut = tensors.clone();
         cut[4].shape = vec![8];
         assert!(refused(&cut, &meta).contains("[8]"), "{}", refused(&cut, &meta));
@@ -207,7 +205,7 @@ mod tests {
 
     #[test]
     fn a_description_out_of_its_limits_is_refused_before_anything_is_made_of_it() {
-        let corpus = Corpus::new(demos(Task::Stack, 3, 20, 0), "training").expect("demos");
+        let corpus = Corpus::new(demos(Toy::Stack, 3, 20, 0), "training").expect("demos");
         let policy = Policy::new(&corpus, &TrainSettings::default(), &mut stream(0, "test", 0));
         for (key, value, said) in [
             ("hidden", json!([0]), "is [0]: networks have 1 to 16 hidden layers of 1 to 4096 units"),
@@ -239,7 +237,7 @@ mod tests {
 
     #[test]
     fn a_policy_of_an_older_version_is_read() {
-        let corpus = Corpus::new(demos(Task::Stack, 3, 20, 0), "training").expect("demos");
+        let corpus = Corpus::new(demos(Toy::Stack, 3, 20, 0), "training").expect("demos");
         let mut settings = TrainSettings::default();
         (settings.sc.knee, settings.sc.balance) = (0.25, false);
         let policy = Policy::new(&corpus, &settings, &mut stream(0, "test", 0));
@@ -255,7 +253,7 @@ mod tests {
 
     #[test]
     fn samples_scatter_around_the_mean() {
-        let corpus = Corpus::new(demos(Task::PickUp, 2, 20, 0), "training").expect("demos");
+        let corpus = Corpus::new(demos(Toy::PickUp, 2, 20, 0), "training").expect("demos");
         let policy = Policy::new(&corpus, &TrainSettings::default(), &mut stream(0, "test", 0));
         let (row, mut rng) = (corpus.state(3), stream(1, "test", 0));
         let mean = policy.act(row);

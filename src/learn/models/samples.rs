@@ -4,7 +4,6 @@ use super::corpus::Corpus;
 use super::dynamics::Dynamics;
 use super::policy::Policy;
 use crate::nn::{LANES, Lanes, Panels, kernel};
-use crate::state::{BASE_DIM, JOINTS};
 use std::array::from_fn;
 
 /// Inputs and targets of a network, worked out when they are asked for: kept for all transitions they would take more memory than the
@@ -50,20 +49,19 @@ impl Samples for ModelSamples<'_> {
     fn write_inputs(&self, rows: &[usize], to: &mut Panels) {
         let (corpus, features) = (self.corpus, self.dynamics.features());
         features.write_transitions(corpus, rows.len(), |i| rows[i], to);
-        let mut action = [Lanes::default(); JOINTS];
         for (p, rows) in rows.chunks(LANES).enumerate() {
-            kernel::interleave(&mut action, from_fn(|lane| corpus.executed(rows[lane.min(rows.len() - 1)])));
-            self.dynamics.write_action(&action, &mut to.panel_mut(p)[features.width()..]);
+            let given = &mut to.panel_mut(p)[features.width()..];
+            kernel::interleave(given, from_fn(|lane| corpus.executed(rows[lane.min(rows.len() - 1)])));
+            self.dynamics.scale_action(given);
         }
         to.clear_tail(rows.len());
     }
 
     fn write_targets(&self, rows: &[usize], panel: &mut [Lanes]) {
         let rows: [usize; LANES] = from_fn(|lane| rows[lane.min(rows.len() - 1)]);
-        let (mut state, mut action) = ([Lanes::default(); BASE_DIM], [Lanes::default(); JOINTS]);
-        kernel::interleave(&mut state, rows.map(|r| self.corpus.state(r)));
-        kernel::interleave(&mut action, rows.map(|r| self.corpus.executed(r)));
-        kernel::interleave(panel, rows.map(|r| self.corpus.next(r)));
-        self.dynamics.write_residuals(&state, &action, panel);
+        let of = rows.map(|r| (self.corpus.state(r), self.corpus.executed(r), self.corpus.next(r)));
+        for (i, slot) in panel.iter_mut().enumerate() {
+            *slot = Lanes(of.map(|(state, action, next)| self.dynamics.residual(i, state, action, next)));
+        }
     }
 }

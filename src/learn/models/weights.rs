@@ -1,16 +1,15 @@
 //! Networks and scalings as named tensors, and back with every shape checked.
 
-use super::features::Features;
-use super::relations::derived_width;
+use super::features::{Features, derived_width};
 use super::scaling::Scaling;
 use crate::config::{FeatureSet, MOST_LAYERS, MOST_UNITS};
+use crate::layout::Layout;
 use crate::nn::{Activation, Mlp};
-use crate::state::JOINTS;
-use crate::task::Task;
 use crate::tensor::NamedTensor;
 use crate::words::shown;
 use serde::de::DeserializeOwned;
 use serde_json::{Map, Value, json};
+use std::sync::Arc;
 
 /// Size of a logarithm whose exponential single precision holds, with room for what it is multiplied with.
 const LARGEST_LOG_STD: f32 = 40.0;
@@ -68,18 +67,19 @@ impl Reader<'_> {
         Reader { tensors: self.tensors, meta: &json!({ "settings": settings }) }.meta("settings")
     }
 
-    /// The kind and task of the network; refuses another kind, and a state size that is not the task's.
-    pub fn task(&self, kind: &str) -> Result<Task, String> {
+    /// The layout of the network; refuses another kind, and a state size that is not the layout's.
+    pub fn layout(&self, kind: &str) -> Result<Arc<Layout>, String> {
         let found: String = self.meta("network")?;
         if found != kind {
             return Err(format!("these are weights of a {} network, but a {kind} network is needed", shown(&found)));
         }
-        let task: Task = self.meta("task")?;
-        let dim: usize = self.meta("state_dim")?;
-        if dim != task.state_dim() {
-            return Err(format!("the network was trained on states of {dim} numbers, but {task} has {}", task.state_dim()));
+        let layout: Layout = self.meta("layout")?;
+        layout.check().map_err(|why| format!("\"layout\" of the description: {why}"))?;
+        let (dim, found, name) = (self.meta::<usize>("state_dim")?, layout.state_dim(), shown(&layout.name));
+        if dim != found {
+            return Err(format!("the network was trained on states of {dim} numbers, but {name} has {found}"));
         }
-        Ok(task)
+        Ok(Arc::new(layout))
     }
 
     /// The values of a tensor of this shape.
@@ -106,8 +106,8 @@ impl Reader<'_> {
     }
 
     /// Logarithms of the standard deviations of an action; refuses one that is out of all proportion.
-    pub fn log_std(&self, name: &str) -> Result<Vec<f32>, String> {
-        let values = self.tensor(name, &[JOINTS])?;
+    pub fn log_std(&self, name: &str, width: usize) -> Result<Vec<f32>, String> {
+        let values = self.tensor(name, &[width])?;
         match values.iter().find(|v| v.abs() > LARGEST_LOG_STD) {
             Some(v) => Err(format!("tensor {name} holds {v}; allowed: -{LARGEST_LOG_STD} to {LARGEST_LOG_STD}")),
             None => Ok(values),
@@ -115,11 +115,11 @@ impl Reader<'_> {
     }
 
     /// What `push_features` wrote.
-    pub fn features(&self, name: &str, task: Task) -> Result<Features, String> {
+    pub fn features(&self, name: &str, layout: &Arc<Layout>) -> Result<Features, String> {
         let set: FeatureSet = self.meta("features")?;
-        let state = self.scaling(&format!("{name}.state"), task.state_dim())?;
-        let derived = self.scaling(&format!("{name}.derived"), derived_width(task, set))?;
-        Ok(Features::from_scaling(task, set, self.meta("mask_dq")?, state, derived))
+        let state = self.scaling(&format!("{name}.state"), layout.state_dim())?;
+        let derived = self.scaling(&format!("{name}.derived"), derived_width(layout, set))?;
+        Ok(Features::from_scaling(layout, set, self.meta("mask_dq")?, state, derived))
     }
 
     /// What `push_network` wrote, for a network with these inputs and outputs.

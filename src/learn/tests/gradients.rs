@@ -1,6 +1,6 @@
 //! Losses of Algorithms 2 and 3 against finite differences, and the batched segments against Algorithm 3 step by step.
 
-use super::testing::demos;
+use super::testing::{ARM_JOINTS, BASE_DIM, FINGERS, JOINTS, Toy, demos};
 use crate::config::{
     ActionChoice, FeatureSet, FingerCloning, Objective, Pairs, PretrainSettings, PulseSettings, ScSettings, StateScale,
     Structure, TrainSettings,
@@ -16,8 +16,6 @@ use crate::learn::models::{Corpus, Dynamics, Policy, PolicySamples, row};
 use crate::math::exp_f32;
 use crate::nn::{Activation, LANES, Lanes, Pass};
 use crate::seed::stream;
-use crate::state::{ARM_JOINTS, BASE_DIM, FINGERS, JOINTS};
-use crate::task::Task;
 use rand::RngExt;
 
 struct World {
@@ -28,8 +26,8 @@ struct World {
     settings: TrainSettings,
 }
 
-fn world(task: Task, structure: Structure, settings: TrainSettings) -> World {
-    let corpus = Corpus::new(demos(task, 8, 20, 5), "training").expect("demos");
+fn world(toy: Toy, structure: Structure, settings: TrainSettings) -> World {
+    let corpus = Corpus::new(demos(toy, 8, 20, 5), "training").expect("demos");
     let (mut rng, mut rows) = (stream(2, "world", 0), Vec::new());
     corpus.rows_of(&[6, 1, 3, 0, 5, 2, 4, 7], &mut rows);
     let policy = Policy::new(&corpus, &settings, &mut rng);
@@ -54,14 +52,14 @@ impl World {
     }
 
     /// L_BC with its whole gradient.
-    fn bc_loss(&self, gradient: &mut Vec<f32>, d_log_std: &mut [f32; JOINTS]) -> f64 {
-        let (mut acted, mut work) = (self.acted(), bc::Workspace::new(self.rows.len()));
+    fn bc_loss(&self, gradient: &mut Vec<f32>, d_log_std: &mut [f32]) -> f64 {
+        let (mut acted, mut work) = (self.acted(), bc::Workspace::new(JOINTS, self.rows.len()));
         let batch = bc::Batch { samples: self.samples(), rows: &self.rows, demos: 8.0 };
         let mut rng = stream(4, "noise", 0);
         let (l_bc, _) = behavior_cloning(&acted, batch, &bc::Choices::new(&self.settings), &mut rng, &mut work);
         gradient.resize(self.policy.net.params().len(), 0.0);
         acted.gradient(&self.policy, 1.0 * l_bc, gradient);
-        *d_log_std = (1.0 * l_bc).d_log_std();
+        (1.0 * l_bc).d_log_std(d_log_std);
         l_bc.value
     }
 
@@ -74,15 +72,15 @@ impl World {
     }
 
     fn pushes(&self) -> Pushes {
-        let mut pushes = Pushes::new(&self.settings.sc, self.rows.len());
+        let mut pushes = Pushes::new(&self.settings.sc, &self.corpus.layout, self.rows.len());
         let lengths = [6, 1, 3, 0, 5, 2, 4, 7].map(|d| self.corpus.demo(d).len());
         pushes.draw(lengths.into_iter(), &mut stream(8, "pushes", 0));
         pushes
     }
 
     /// L_SC with its whole gradient; nothing else has been computed before.
-    fn sc_loss(&self, gradient: &mut Vec<f32>, d_log_std: &mut [f32; JOINTS]) -> f64 {
-        let (mut acted, mut work) = (self.acted(), sc::Workspace::new(self.rows.len()));
+    fn sc_loss(&self, gradient: &mut Vec<f32>, d_log_std: &mut [f32]) -> f64 {
+        let (mut acted, mut work) = (self.acted(), sc::Workspace::new(JOINTS, self.rows.len()));
         let (noise, pushes, segments) = (noise(&self.settings, self.rows.len()), self.pushes(), self.segments());
         let batch = sc::Batch {
             corpus: &self.corpus,
@@ -96,14 +94,14 @@ impl World {
         let l_sc = state_cloning(&self.policy, &self.dynamics, &acted, batch, &choices, &mut work);
         gradient.resize(self.policy.net.params().len(), 0.0);
         acted.gradient(&self.policy, 1.0 * l_sc, gradient);
-        *d_log_std = (1.0 * l_sc).d_log_std();
+        (1.0 * l_sc).d_log_std(d_log_std);
         l_sc.value
     }
 }
 
 fn noise(settings: &TrainSettings, rows: usize) -> Vec<f32> {
     let mut noise = Vec::new();
-    bc::draw_noise(settings.action == ActionChoice::Sample, rows, &mut stream(6, "noise", 0), &mut noise);
+    bc::draw_noise(settings.action == ActionChoice::Sample, rows * JOINTS, &mut stream(6, "noise", 0), &mut noise);
     noise
 }
 
@@ -151,7 +149,7 @@ fn check(world: &mut World, gradient: &[f32], d_log_std: &[f32], mut loss: impl 
 fn behavior_cloning_gradient_equals_finite_differences() {
     for (action, loss) in [(ActionChoice::Mean, Objective::StandardisedMean), (ActionChoice::Sample, Objective::RawSum)] {
         let settings = small(TrainSettings { action, loss, ..Default::default() });
-        let mut world = world(Task::Stack, Structure::Plain, settings);
+        let mut world = world(Toy::Stack, Structure::Plain, settings);
         let (mut gradient, mut d_log_std) = (Vec::new(), [0.0; JOINTS]);
         world.bc_loss(&mut gradient, &mut d_log_std);
         // under the mean action the log standard deviations learn from the likelihood, which nn::gaussian tests
@@ -164,11 +162,11 @@ fn behavior_cloning_gradient_equals_finite_differences() {
 fn sc_worlds() -> Vec<(&'static str, World)> {
     let defaults = TrainSettings { rho: 0.3, ..Default::default() };
     vec![
-        ("fk-near, kinematic", world(Task::Stack, Structure::Kinematic, small(defaults.clone()))),
+        ("fk-near, kinematic", world(Toy::Stack, Structure::Kinematic, small(defaults.clone()))),
         (
             "raw, plain, sampled, literal",
             world(
-                Task::PickUp,
+                Toy::PickUp,
                 Structure::Plain,
                 small(TrainSettings {
                     features: FeatureSet::Raw,
@@ -190,7 +188,7 @@ fn sc_worlds() -> Vec<(&'static str, World)> {
         (
             "fk, relu, state scale, no recovery",
             world(
-                Task::PickAndPlace,
+                Toy::PickAndPlace,
                 Structure::Kinematic,
                 small(TrainSettings {
                     features: FeatureSet::Fk,
@@ -319,9 +317,9 @@ fn batched_segments_equal_algorithm_3_step_by_step() {
         small(TrainSettings { sc, rho: 0.3, ..Default::default() })
     };
     let masked = of(FingerCloning::None);
-    let masked = ("fingers left out", world(Task::Stack, Structure::Kinematic, masked));
+    let masked = ("fingers left out", world(Toy::Stack, Structure::Kinematic, masked));
     let straight = of(FingerCloning::StraightThrough);
-    let straight = ("straight through the fingers", world(Task::Stack, Structure::Plain, straight));
+    let straight = ("straight through the fingers", world(Toy::Stack, Structure::Plain, straight));
     for (name, world) in sc_worlds().into_iter().chain([masked, straight]) {
         let (mut batched, mut plain) = (Vec::new(), vec![0.0; world.policy.net.params().len()]);
         let loss = world.sc_loss(&mut batched, &mut [0.0; JOINTS]);

@@ -1,18 +1,17 @@
 //! Training that stops and goes on, and the choice of a model, on toy demos.
 
-use super::testing::demos;
+use super::testing::{Toy, demos};
 use crate::config::{Alpha, PretrainSettings, ScSettings, TrainSettings};
 use crate::error::{Error, Result};
 use crate::interrupt::Interrupt;
 use crate::learn::{Checkpoint, Dynamics, Hooks, Inputs, MethodName as Method, Policy, Trained, pretrain_dynamics, train};
 use crate::table::Values;
-use crate::task::Task;
 use serde_json::Value;
 use std::time::Duration;
 
 fn dynamics() -> Dynamics {
     let settings = PretrainSettings { hidden_units: 16, epochs: 1, batch_rows: 64, ..Default::default() };
-    let (train, held_out) = (demos(Task::Stack, 8, 30, 0), demos(Task::Stack, 2, 30, 100));
+    let (train, held_out) = (demos(Toy::Stack, 8, 30, 0), demos(Toy::Stack, 2, 30, 100));
     pretrain_dynamics(&train, &held_out, &settings, 0, &mut |_, _| {}, &Interrupt::default()).expect("pretrains").0
 }
 
@@ -31,7 +30,7 @@ fn quick() -> TrainSettings {
 }
 
 fn run(method: Method, settings: &TrainSettings, hooks: Hooks) -> Result<Trained> {
-    let (demos, held_out) = (demos(Task::Stack, 8, 30, 0), demos(Task::Stack, 2, 30, 100));
+    let (demos, held_out) = (demos(Toy::Stack, 8, 30, 0), demos(Toy::Stack, 2, 30, 100));
     let model = (method != Method::Bc).then(dynamics);
     train(method, Inputs::new(&demos, &held_out)?, model, settings, 7, hooks)
 }

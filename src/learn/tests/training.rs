@@ -1,19 +1,17 @@
 //! Training from end to end on toy demos.
 
-use super::testing::{demo, demos};
+use super::testing::{JOINTS, Toy, demo, demos};
 use crate::config::{Alpha, PretrainSettings, TrainSettings};
 use crate::demo::Demo;
 use crate::error::{Error, Result};
 use crate::interrupt::Interrupt;
 use crate::learn::methods::Hil;
 use crate::learn::{Dynamics, Hooks, Inputs, MethodName as Method, ModelReport, Policy, Trained, pretrain_dynamics, train};
-use crate::state::JOINTS;
 use crate::table::{Column, Values};
-use crate::task::Task;
 
-fn pretrain(task: Task, epochs: u64) -> (Dynamics, ModelReport) {
+fn pretrain(toy: Toy, epochs: u64) -> (Dynamics, ModelReport) {
     let settings = PretrainSettings { hidden_units: 24, epochs, batch_rows: 64, ..Default::default() };
-    let (train, held_out) = (demos(task, 8, 30, 0), demos(task, 2, 30, 100));
+    let (train, held_out) = (demos(toy, 8, 30, 0), demos(toy, 2, 30, 100));
     pretrain_dynamics(&train, &held_out, &settings, 0, &mut |_, _| {}, &Interrupt::default()).expect("pretraining works")
 }
 
@@ -31,7 +29,7 @@ fn quick() -> TrainSettings {
 }
 
 fn run(method: Method, settings: &TrainSettings, dynamics: Option<Dynamics>) -> Result<Trained> {
-    let (demos, held_out) = (demos(Task::Stack, 8, 30, 0), demos(Task::Stack, 2, 30, 100));
+    let (demos, held_out) = (demos(Toy::Stack, 8, 30, 0), demos(Toy::Stack, 2, 30, 100));
     train(method, Inputs::new(&demos, &held_out)?, dynamics, settings, 7, Hooks::new(&Interrupt::default()))
 }
 
@@ -41,7 +39,7 @@ fn bytes(policy: &Policy) -> Vec<u32> {
 
 #[test]
 fn pure_cloning_is_the_loop_with_alpha_at_its_ends() {
-    let dynamics = pretrain(Task::Stack, 2).0;
+    let dynamics = pretrain(Toy::Stack, 2).0;
     let fixed = |alpha: f64, warm_start_updates| TrainSettings { alpha: Alpha::Fixed(alpha), warm_start_updates, ..quick() };
     let policy = |method, settings: &TrainSettings| bytes(&run(method, settings, Some(dynamics.clone())).expect("trains").policy);
     let bc = policy(Method::Bc, &quick());
@@ -59,7 +57,7 @@ fn one_and_two_threads_give_the_same_bytes() {
     let on = |threads: usize| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads start");
         pool.install(|| {
-            let (dynamics, report) = pretrain(Task::Stack, 3);
+            let (dynamics, report) = pretrain(Toy::Stack, 3);
             let trained = run(Method::Hil, &quick(), Some(dynamics)).expect("trains");
             let model = trained.dynamics.expect("kept").to_tensors();
             (bytes(&trained.policy), model, format!("{report:?}{:?}", trained.metrics))
@@ -70,7 +68,7 @@ fn one_and_two_threads_give_the_same_bytes() {
 
 #[test]
 fn a_toy_is_learned_by_each_method() {
-    let (dynamics, report) = pretrain(Task::Stack, 150);
+    let (dynamics, report) = pretrain(Toy::Stack, 150);
     let number = |name: &str, row: usize| match &report.errors.column(name).expect("column").values {
         Values::F64(v) => v[row],
         other => panic!("{other:?}"),
@@ -81,8 +79,8 @@ fn a_toy_is_learned_by_each_method() {
         assert!(number("integrated_10_steps", group) < 1e-4, "the toy integrates its commands");
     }
     let settings = TrainSettings { warm_start_updates: 600, epochs: 60, learning_rate: 1e-3, ..quick() };
-    let unseen = demo(Task::Stack, 30, 999);
-    let (many, held_out) = (demos(Task::Stack, 40, 30, 0), demos(Task::Stack, 2, 30, 100));
+    let unseen = demo(Toy::Stack, 30, 999);
+    let (many, held_out) = (demos(Toy::Stack, 40, 30, 0), demos(Toy::Stack, 2, 30, 100));
     let error = |method: Method, settings: &TrainSettings| -> f64 {
         let go = Interrupt::default();
         let model = Some(dynamics.clone());
@@ -106,8 +104,8 @@ fn a_toy_is_learned_by_each_method() {
 fn metrics_have_one_row_an_epoch() {
     let (mut logged, go) = (Vec::new(), Interrupt::default());
     let hooks = Hooks { log: Box::new(|m, _| logged.push(m.clone())), ..Hooks::new(&go) };
-    let inputs = Inputs::new(demos(Task::Stack, 8, 30, 0), demos(Task::Stack, 2, 30, 100)).expect("demos");
-    let dynamics = pretrain(Task::Stack, 1).0;
+    let inputs = Inputs::new(demos(Toy::Stack, 8, 30, 0), demos(Toy::Stack, 2, 30, 100)).expect("demos");
+    let dynamics = pretrain(Toy::Stack, 1).0;
     let trained = train(Method::Hil, inputs, Some(dynamics), &quick(), 7, hooks).expect("trains");
     assert_eq!(trained.metrics.rows(), logged.len());
     let last = logged.last().expect("epochs");
@@ -136,9 +134,9 @@ fn what_cannot_work_is_refused_in_words() {
         assert!(matches!(&error, Error::Usage(m) if m.contains(key)), "{error}");
     }
     assert!(refused(Method::Hil, &quick(), None).to_string().contains("hilt pretrain"));
-    let other = pretrain(Task::PickUp, 1).0;
+    let other = pretrain(Toy::PickUp, 1).0;
     let message = refused(Method::Hil, &quick(), Some(other)).to_string();
-    assert!(message.contains("32") && message.contains("25"), "{message}");
+    assert!(message.contains("28") && message.contains("21"), "{message}");
 
     let none: &[Demo] = &[];
     let go = Interrupt::default();
@@ -148,7 +146,7 @@ fn what_cannot_work_is_refused_in_words() {
     let message = refused(Method::Bc, &diverging, None).to_string();
     assert!(message.contains("L_BC"), "{message}");
     go.raise(2);
-    let (some, held_out) = (demos(Task::Stack, 2, 9, 0), demos(Task::Stack, 1, 9, 9));
+    let (some, held_out) = (demos(Toy::Stack, 2, 9, 0), demos(Toy::Stack, 1, 9, 9));
     let inputs = Inputs::new(&some, &held_out).expect("demos");
     let error = train(Method::Bc, inputs, None, &quick(), 0, Hooks::new(&go)).expect_err("interrupted");
     assert!(matches!(error, Error::Interrupted));
@@ -195,7 +193,7 @@ ema_decay = 0.0
 fn the_literal_preset_parses_and_trains() {
     let pretrain: PretrainSettings = toml::from_str(PAPER_PRETRAIN).expect("known keys");
     let settings: TrainSettings = toml::from_str(PAPER_TRAIN).expect("known keys");
-    let (some, held_out) = (demos(Task::PickUp, 6, 30, 0), demos(Task::PickUp, 2, 30, 100));
+    let (some, held_out) = (demos(Toy::PickUp, 6, 30, 0), demos(Toy::PickUp, 2, 30, 100));
     let go = Interrupt::default();
     let (dynamics, _) = pretrain_dynamics(&some, &held_out, &pretrain, 0, &mut |_, _| {}, &go).expect("pretrains");
     for rho in [0.0, 0.6, 1.0] {
@@ -215,7 +213,7 @@ fn the_literal_preset_parses_and_trains() {
 /// One update an epoch: the validation demos meet the diverged network before another update does.
 #[test]
 fn pretraining_whose_validation_loss_is_no_number_fails_and_says_since_when() {
-    let (train, held_out) = (demos(Task::Stack, 4, 20, 0), demos(Task::Stack, 2, 20, 100));
+    let (train, held_out) = (demos(Toy::Stack, 4, 20, 0), demos(Toy::Stack, 2, 20, 100));
     let fails = |settings: PretrainSettings| {
         let result = pretrain_dynamics(&train, &held_out, &settings, 0, &mut |_, _| {}, &Interrupt::default());
         result.expect_err("diverged").to_string()
@@ -239,7 +237,7 @@ fn pretraining_whose_validation_loss_is_no_number_fails_and_says_since_when() {
 #[test]
 fn a_loss_that_is_none_before_the_first_update_blames_the_demos_and_not_the_learning_rate() {
     let settings = quick();
-    let (train, held_out) = (demos(Task::Stack, 2, 9, 0), demos(Task::Stack, 1, 9, 9));
+    let (train, held_out) = (demos(Toy::Stack, 2, 9, 0), demos(Toy::Stack, 1, 9, 9));
     let inputs = Inputs::new(&train, &held_out).expect("demos");
     let mut bc = Hil::new(inputs, None, Alpha::Fixed(0.0), &settings, 0).expect("a policy");
     bc.policy_mut().net.params_mut().fill(f32::NAN);
@@ -253,10 +251,10 @@ fn a_loss_that_is_none_before_the_first_update_blames_the_demos_and_not_the_lear
 #[test]
 fn demos_that_never_change_are_learned_from_without_a_loss_that_is_none() {
     let still = |seed| {
-        let like = demo(Task::PickUp, 12, seed);
+        let like = demo(Toy::PickUp, 12, seed);
         let row = like.state(0).to_vec();
         let states = row.repeat(13);
-        Demo::new(Task::PickUp, states, vec![0.0; 12 * JOINTS], vec![0.0; 12 * JOINTS]).expect("lengths match")
+        Demo::new(like.layout(), states, vec![0.0; 12 * JOINTS], vec![0.0; 12 * JOINTS]).expect("lengths match")
     };
     let (one, other) = ([still(1), still(1)], [still(1)]);
     let settings = PretrainSettings { hidden_units: 8, epochs: 2, ..Default::default() };

@@ -26,6 +26,16 @@ const ARM: [Rgb; 4] = [[82, 90, 108], [150, 160, 176], [108, 118, 136], [86, 96,
 /// Colour of each link.
 pub const LINK_COLORS: [Rgb; LINKS] = [ARM[0], ARM[1], ARM[2], ARM[1], ARM[2], ARM[1], ARM[3], ARM[2], ARM[2], ARM[2]];
 
+/// Colour of a link of any robot, whose arm has so many joints.
+pub fn of_link(link: usize, arm: usize) -> Rgb {
+    match link {
+        0 => ARM[0],
+        link if link == arm => ARM[3],
+        link if link < arm && link % 2 == 1 => ARM[1],
+        _ => ARM[2],
+    }
+}
+
 /// Palette index of "as in the picture before".
 pub const UNCHANGED: u8 = 255;
 /// Colours whose shades are in the palette.

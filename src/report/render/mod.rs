@@ -6,10 +6,12 @@ mod font;
 mod gif;
 mod mesh;
 mod raster;
+mod robot;
 mod shadow;
 mod sheet;
 
 pub use self::gif::{GifOptions, write_gif};
+pub use self::robot::robot_png;
 pub use sheet::write_png_sheet;
 
 use crate::demo::{Episode, Step};

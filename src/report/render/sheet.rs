@@ -59,14 +59,16 @@ fn sheet(episode: &Episode, (columns, rows): (u32, u32), size: (u32, u32), inter
     Ok(sheet)
 }
 
-fn paste(sheet: &mut RgbImage, picture: &RgbImage, left: u32, top: u32) {
+/// Puts a picture into a larger one.
+pub(super) fn paste(sheet: &mut RgbImage, picture: &RgbImage, left: u32, top: u32) {
     for (y, row) in picture.data.chunks_exact(picture.width as usize * 3).enumerate() {
         let start = ((top as usize + y) * sheet.width as usize + left as usize) * 3;
         sheet.data[start..start + row.len()].copy_from_slice(row);
     }
 }
 
-fn write_png<W: Write>(image: &RgbImage, out: W) -> std::result::Result<(), png::EncodingError> {
+/// As a PNG file.
+pub(super) fn write_png<W: Write>(image: &RgbImage, out: W) -> std::result::Result<(), png::EncodingError> {
     let mut encoder = png::Encoder::new(out, image.width, image.height);
     encoder.set_color(png::ColorType::Rgb);
     encoder.set_depth(png::BitDepth::Eight);

@@ -1,8 +1,9 @@
 //! The keys that shape L_SC, and what they make of the demos.
 
 use crate::config::{ActionChoice, FingerCloning, Objective, Pairs, StateScale, TrainSettings};
-use crate::learn::models::{Corpus, DT_S, STEP_FLOOR, Scaling};
-use crate::state::{ARM_JOINTS, BASE_DIM, FINGERS, JOINTS};
+use crate::layout::Layout;
+use crate::learn::models::{Corpus, STEP_FLOOR, Scaling};
+use std::ops::Range;
 
 /// Spread of a state entry below which L_SC counts it as constant under `train.sc.scale = "state"`.
 const STATE_FLOOR: f32 = 0.01;
@@ -11,12 +12,13 @@ const STATE_FLOOR: f32 = 0.01;
 /// zone in recorded stacks 28 % were followed to a twentieth, 70 % not at all (hand open, or holding), and 2 % lie between.
 const FOLLOWING: f32 = 0.5;
 
-/// Which fingers' commands L_SC teaches in transition `r`: 1, or 0.
-fn taught_fingers(fingers: FingerCloning, corpus: &Corpus, r: usize) -> [f32; FINGERS] {
-    std::array::from_fn(|finger| {
-        let i = ARM_JOINTS + finger;
-        let commanded = DT_S * corpus.executed(r)[i];
-        let missed = corpus.next(r)[i] - corpus.state(r)[i] - commanded;
+/// Which fingers' commands L_SC teaches in transition `r`: 1, or 0. One whose position is not known follows.
+fn taught_fingers(fingers: FingerCloning, corpus: &Corpus, r: usize) -> impl Iterator<Item = f32> {
+    let (layout, dt_s) = (&corpus.layout, corpus.layout.period_s as f32);
+    layout.fingers().map(move |i| {
+        let commanded = dt_s * corpus.executed(r)[i];
+        let moved = layout.positions().nth(i).map_or(commanded, |at| corpus.next(r)[at] - corpus.state(r)[at]);
+        let missed = moved - commanded;
         f32::from(match fingers {
             FingerCloning::All | FingerCloning::StraightThrough => true,
             FingerCloning::Following => missed.abs() <= FOLLOWING * commanded.abs(),
@@ -25,16 +27,26 @@ fn taught_fingers(fingers: FingerCloning, corpus: &Corpus, r: usize) -> [f32; FI
     })
 }
 
+/// Whether entry `i` of a state is the position or the velocity of a finger.
+fn is_finger(layout: &Layout, i: usize) -> bool {
+    let fingers = layout.fingers();
+    [layout.positions(), layout.velocities()]
+        .into_iter()
+        .any(|joints| joints.contains(&i) && fingers.contains(&(i - joints.start)))
+}
+
 /// What of L_SC does not change from update to update.
 pub struct Choices {
     /// Weight of each state entry's squared error.
-    pub weights: [f32; BASE_DIM],
-    /// 1 where the gradient reaches a finger's command, else 0: transitions x 3.
+    pub weights: Vec<f32>,
+    /// 1 where the gradient reaches a finger's command, else 0: transitions x fingers.
     pub taught: Vec<f32>,
+    /// The entries of an action that drive fingers.
+    pub fingers: Range<usize>,
     /// Whether the gradient with respect to a finger's command leaves out what the network makes of it.
     pub straight_through: bool,
     /// Error of each state entry beyond which the loss is a line.
-    pub knees: [f32; BASE_DIM],
+    pub knees: Vec<f32>,
     /// Whether L_SC is a sum over a demo instead of a mean.
     objective: Objective,
     /// Which pairs enter B.
@@ -48,9 +60,9 @@ pub struct Choices {
 impl Choices {
     /// From the settings and the training demos.
     pub fn new(settings: &TrainSettings, corpus: &Corpus) -> Self {
-        let dim = corpus.task.state_dim();
+        let (layout, dim, changing) = (&corpus.layout, corpus.layout.state_dim(), corpus.layout.changing());
         let std = match (settings.loss, settings.sc.scale) {
-            (Objective::RawSum, _) => vec![1.0; BASE_DIM],
+            (Objective::RawSum, _) => vec![1.0; changing],
             (_, StateScale::State) => {
                 Scaling::fit(corpus.rows(), dim, STATE_FLOOR, |r, row| row.copy_from_slice(corpus.state(r))).std
             }
@@ -59,17 +71,18 @@ impl Choices {
                     let entries = row.iter_mut().zip(corpus.next(r).iter().zip(corpus.state(r)));
                     entries.for_each(|(change, (next, state))| *change = next - state);
                 };
-                Scaling::fit(corpus.rows(), BASE_DIM, STEP_FLOOR, change).std
+                Scaling::fit(corpus.rows(), changing, STEP_FLOOR, change).std
             }
         };
-        let velocity = |i: usize| (JOINTS..2 * JOINTS).contains(&i);
-        let finger = |i: usize| i < 2 * JOINTS && i % JOINTS >= ARM_JOINTS;
-        let masked = |i: usize| settings.sc.mask_dq && velocity(i) || settings.sc.fingers == FingerCloning::None && finger(i);
-        let weights: [f32; BASE_DIM] = std::array::from_fn(|i| if masked(i) { 0.0 } else { 1.0 / (std[i] * std[i]) });
+        let velocity = |i: usize| layout.velocities().contains(&i);
+        let masked =
+            |i: usize| settings.sc.mask_dq && velocity(i) || settings.sc.fingers == FingerCloning::None && is_finger(layout, i);
+        let weights: Vec<f32> = (0..changing).map(|i| if masked(i) { 0.0 } else { 1.0 / (std[i] * std[i]) }).collect();
         let knee = if settings.sc.knee > 0.0 { settings.sc.knee as f32 } else { f32::INFINITY };
         Choices {
+            knees: weights.iter().map(|weight| if *weight > 0.0 { knee / weight.sqrt() } else { f32::INFINITY }).collect(),
             weights,
-            knees: weights.map(|weight| if weight > 0.0 { knee / weight.sqrt() } else { f32::INFINITY }),
+            fingers: layout.fingers(),
             taught: (0..corpus.rows()).flat_map(|r| taught_fingers(settings.sc.fingers, corpus, r)).collect(),
             straight_through: settings.sc.fingers == FingerCloning::StraightThrough,
             objective: settings.loss,
@@ -83,7 +96,7 @@ impl Choices {
     pub fn scale(&self, rows: usize, demos: usize) -> f32 {
         match self.objective {
             Objective::RawSum => 1.0 / demos as f32,
-            Objective::StandardisedMean => 1.0 / (rows * BASE_DIM) as f32,
+            Objective::StandardisedMean => 1.0 / (rows * self.weights.len()) as f32,
         }
     }
 }
@@ -93,28 +106,31 @@ mod tests {
     use super::*;
     use crate::config::ScSettings;
     use crate::demo::Demo;
-    use crate::task::Task;
+    use crate::learn::tests::testing::Toy;
 
     #[test]
     fn l_sc_teaches_fingers_that_follow_their_commands() {
-        let (task, finger, command) = (Task::PickUp, ARM_JOINTS + 1, 0.4);
+        let (layout, command) = (Toy::PickUp.layout(), 0.4);
+        let (finger, fingers) = (layout.fingers().start + 1, layout.fingers().len());
         let moves = [0.9, 0.6, 0.3, 0.0, -1.0, 1.6]; // shares of the commanded motion
-        let mut states = vec![vec![0.0; task.state_dim()]];
+        let mut states = vec![vec![0.0; layout.state_dim()]];
         for share in moves {
             let mut next = states[states.len() - 1].clone();
-            next[finger] += share * DT_S * command;
+            next[finger] += share * layout.period_s as f32 * command;
             states.push(next);
         }
-        let actions = [[0.0; ARM_JOINTS + 1].as_slice(), &[command, 0.0]].concat().repeat(moves.len());
-        let demo = Demo::new(task, states.concat(), actions.clone(), actions).expect("lengths match");
+        let mut action = vec![0.0; layout.action_dim()];
+        action[finger] = command;
+        let actions = action.repeat(moves.len());
+        let demo = Demo::new(&layout, states.concat(), actions.clone(), actions).expect("lengths match");
         let corpus = Corpus::new(&[demo], "training").expect("a demo");
-        let taught = |fingers| {
-            let sc = ScSettings { fingers, ..Default::default() };
+        let taught = |cloning| {
+            let sc = ScSettings { fingers: cloning, ..Default::default() };
             Choices::new(&TrainSettings { sc, ..Default::default() }, &corpus).taught
         };
-        let of_finger: Vec<f32> = taught(FingerCloning::Following).into_iter().skip(1).step_by(FINGERS).collect();
+        let of_finger: Vec<f32> = taught(FingerCloning::Following).into_iter().skip(1).step_by(fingers).collect();
         assert_eq!(of_finger, [1.0, 1.0, 0.0, 0.0, 0.0, 0.0]);
-        assert_eq!(taught(FingerCloning::All), [1.0; 6 * FINGERS]);
-        assert_eq!(taught(FingerCloning::None), [0.0; 6 * FINGERS]);
+        assert_eq!(taught(FingerCloning::All), vec![1.0; 6 * fingers]);
+        assert_eq!(taught(FingerCloning::None), vec![0.0; 6 * fingers]);
     }
 }

@@ -18,7 +18,6 @@ use super::acted::Acted;
 use super::policy_loss::PolicyLoss;
 use super::shards;
 use crate::learn::models::{Dynamics, Policy};
-use crate::state::JOINTS;
 use rayon::prelude::*;
 use rollout::Rollout;
 use segments::share;
@@ -32,11 +31,11 @@ pub struct Workspace {
 }
 
 impl Workspace {
-    /// With room for batches of at most `most_rows` states.
-    pub fn new(most_rows: usize) -> Self {
+    /// For actions of `dim` entries, with room for batches of at most `most_rows` states.
+    pub fn new(dim: usize, most_rows: usize) -> Self {
         let mut rollouts = Vec::new();
         rollouts.resize_with(shards::MAX_SEGMENT_SHARDS, Rollout::default);
-        Workspace { loss: PolicyLoss::new("L_SC (Eq. 5)", most_rows), rollouts, sorted: Vec::with_capacity(most_rows) }
+        Workspace { loss: PolicyLoss::new("L_SC (Eq. 5)", dim, most_rows), rollouts, sorted: Vec::with_capacity(most_rows) }
     }
 }
 
@@ -67,15 +66,15 @@ pub fn state_cloning<'a>(
     for rollout in &rollouts[..active] {
         loss.value += rollout.loss;
         shards::add_scaled(&mut loss.d_log_std, &rollout.d_log_std, 1.0);
-        for (start, d_first) in &rollout.first_actions {
-            add_first(loss, rows, *start, d_first);
+        for (start, d_first) in rollout.first_actions() {
+            add_first(loss, rows, start, d_first);
         }
     }
     loss
 }
 
 /// The gradient with respect to the mean action in state `row` of the batch.
-fn add_first(loss: &mut PolicyLoss, rows: usize, row: usize, d_first: &[f32; JOINTS]) {
+fn add_first(loss: &mut PolicyLoss, rows: usize, row: usize, d_first: &[f32]) {
     let (shard, start) = shards::place(rows, row);
     loss.d_mean[shard].write_row(row - start, d_first);
 }

@@ -6,12 +6,11 @@
 
 use super::segments::Segment;
 use super::setting::Setting;
-use crate::config::{ActionChoice, Structure};
+use crate::config::ActionChoice;
 use crate::learn::losses::regression::bend;
-use crate::learn::models::{DT_S, Dynamics, Hand, Policy, row};
+use crate::learn::models::{Dynamics, Hand, Policy, row};
 use crate::math::exp_f32;
 use crate::nn::{LANES, Lanes, Panels, Pass, kernel, panels_of};
-use crate::state::{ARM_JOINTS, BASE_DIM, FINGERS, JOINTS};
 use std::ops::Range;
 
 /// Steps of a group of segments: what it keeps for the way back, some 4 kB a step, then waits in a core's second cache.
@@ -46,10 +45,13 @@ pub struct Rollout {
     d_states: Panels,
     /// Gradient with respect to each segment's first mean action.
     d_first: Panels,
-    /// The same of all groups so far, with the transition that it belongs to.
-    pub first_actions: Vec<(usize, [f32; JOINTS])>,
+    /// The same of all groups so far, row by row, and the transitions that they belong to.
+    d_first_rows: Vec<f32>,
+    first_rows: Vec<usize>,
+    /// What should have been predicted in the panel at hand.
+    targets: Vec<Lanes>,
     /// Gradient with respect to the log standard deviations.
-    pub d_log_std: [f32; JOINTS],
+    pub d_log_std: Vec<f32>,
     /// This shard's part of L_SC.
     pub loss: f64,
 }
@@ -97,19 +99,25 @@ fn groups(segments: &[Segment]) -> impl Iterator<Item = &[Segment]> {
 impl Rollout {
     /// Allocates for any segments of `rows` transitions, none of more than `longest` steps.
     pub fn provide(&mut self, policy: &Policy, dynamics: &Dynamics, rows: usize, longest: usize) {
-        self.first_actions.clear();
-        self.first_actions.reserve(rows);
+        let layout = dynamics.layout();
+        let (dim, changing) = (layout.action_dim(), layout.changing());
+        self.first_rows.clear();
+        self.first_rows.reserve(rows);
+        self.d_first_rows.clear();
+        self.d_first_rows.reserve(rows * dim);
+        self.targets.resize(changing, Lanes::default());
+        self.d_log_std.resize(dim, 0.0);
         let rows = rows.min(GROUP_STEPS + GROUP_SEGMENTS * longest);
         let (first, panels) = (panels_of(rows), panels_of(rows) + longest); // each depth may leave one panel half empty
         self.policy.provide(&policy.net, panels);
         self.model.provide(&dynamics.net, panels);
-        self.states.provide(dynamics.task().state_dim(), panels);
-        self.predictions.provide(BASE_DIM, panels);
-        self.d_states.provide(BASE_DIM, first);
-        self.taught.provide(FINGERS, first);
+        self.states.provide(layout.state_dim(), panels);
+        self.predictions.provide(changing, panels);
+        self.d_states.provide(changing, first);
+        self.taught.provide(layout.fingers().len(), first);
         [&mut self.actions, &mut self.noise, &mut self.pushes, &mut self.d_first]
             .into_iter()
-            .for_each(|array| array.provide(JOINTS, first));
+            .for_each(|array| array.provide(dim, first));
         self.hands.reserve(panels.saturating_sub(self.hands.len()));
         self.segments.clear();
         self.segments.reserve(rows);
@@ -138,8 +146,10 @@ impl Rollout {
     /// Loss and gradient of segments, sorted by length, longest first.
     pub fn run(&mut self, segments: &[Segment], setting: Setting) {
         let Setting { policy, .. } = setting;
-        (self.loss, self.d_log_std) = (0.0, [0.0; JOINTS]);
-        self.first_actions.clear();
+        self.loss = 0.0;
+        self.d_log_std.fill(0.0);
+        self.first_rows.clear();
+        self.d_first_rows.clear();
         policy.net.begin_gradient(&mut self.policy);
         for group in groups(segments) {
             self.deal(group);
@@ -158,26 +168,32 @@ impl Rollout {
         }
         policy.net.add_gradient(&mut self.policy, 0..self.hands.len() - panels_of(self.segments.len()));
         for (i, segment) in self.segments.iter().enumerate() {
-            let mut d_first = [0.0; JOINTS];
-            self.d_first.read_row(i, &mut d_first);
-            self.first_actions.push((segment.start, d_first));
+            let (at, dim) = (self.d_first_rows.len(), self.d_first.width());
+            self.first_rows.push(segment.start);
+            self.d_first_rows.resize(at + dim, 0.0);
+            self.d_first.read_row(i, &mut self.d_first_rows[at..]);
         }
+    }
+
+    /// The gradient with respect to the first mean action of each segment, and the transition that it belongs to.
+    pub fn first_actions(&self) -> impl Iterator<Item = (usize, &[f32])> {
+        self.first_rows.iter().copied().zip(self.d_first_rows.chunks_exact(self.d_first.width().max(1)))
     }
 
     fn prepare(&mut self, setting: Setting) {
         let Setting { policy, dynamics, batch, .. } = setting;
         let panels: usize = self.counts.iter().map(|c| panels_of(*c)).sum();
-        let (dim, first) = (batch.corpus.task.state_dim(), panels_of(self.segments.len()));
+        let (layout, first) = (dynamics.layout(), panels_of(self.segments.len()));
         self.policy.reserve(&policy.net, panels - first);
         self.model.reserve(&dynamics.net, panels);
-        self.states.reserve(dim, panels);
+        self.states.reserve(layout.state_dim(), panels);
         self.hands.resize(panels, Hand::default());
-        self.predictions.reserve(BASE_DIM, panels);
+        self.predictions.reserve(layout.changing(), panels);
         for array in [&mut self.actions, &mut self.noise, &mut self.pushes, &mut self.d_first] {
-            array.reserve(JOINTS, first);
+            array.reserve(layout.action_dim(), first);
         }
-        self.d_states.reserve(BASE_DIM, first);
-        self.taught.reserve(FINGERS, first);
+        self.d_states.reserve(layout.changing(), first);
+        self.taught.reserve(layout.fingers().len(), first);
         self.d_states.span_mut(&(0..first)).fill(Lanes::default());
         let demo_row = |i: usize| batch.rows[self.segments[i].start];
         self.states.write_rows(0, self.segments.len(), |i| batch.corpus.state(demo_row(i)));
@@ -209,11 +225,11 @@ impl Rollout {
         }
         for p in 0..panels_of(depth.next_count) {
             let (from, to) = (depth.from + p, depth.from + depth.panels + p);
-            let dim = self.states.width();
+            let (dim, changing) = (self.states.width(), self.predictions.width());
             let (before, after) = self.states.split_at_mut(to);
             let next = &mut after[..dim];
-            next[..BASE_DIM].copy_from_slice(self.predictions.panel(from));
-            next[BASE_DIM..].copy_from_slice(&before[from * dim..(from + 1) * dim][BASE_DIM..]);
+            next[..changing].copy_from_slice(self.predictions.panel(from));
+            next[changing..].copy_from_slice(&before[from * dim..(from + 1) * dim][changing..]);
         }
         self.states.clear_tail((depth.from + depth.panels) * LANES + depth.next_count);
     }
@@ -222,8 +238,8 @@ impl Rollout {
     fn act<'a>(&mut self, depth: Depth, setting: Setting<'a>) {
         let Setting { policy, mean, batch, choices, .. } = setting;
         let (sampled, pushed) = (choices.action == ActionChoice::Sample, !batch.pushes.is_empty());
-        let segments = &self.segments;
-        let of_step = |rows: &'a [f32]| move |i: usize| row(rows, JOINTS, segments[i].start + depth.j);
+        let (segments, dim) = (&self.segments, self.actions.width());
+        let of_step = |rows: &'a [f32]| move |i: usize| row(rows, dim, segments[i].start + depth.j);
         if depth.j == 0 {
             self.actions.write_rows(0, depth.count, of_step(mean));
         }
@@ -279,9 +295,9 @@ impl Rollout {
     fn add_loss(&mut self, depth: Depth, p: usize, at: usize, setting: Setting) {
         let Setting { dynamics, batch, choices, .. } = setting;
         let scale = choices.scale(batch.rows.len(), batch.demos);
-        let (segments, mut targets) = (depth.segments(p), [Lanes::default(); BASE_DIM]);
+        let (segments, targets) = (depth.segments(p), &mut self.targets);
         let target = |i: usize| batch.corpus.next(batch.rows[self.segments[i].start + depth.j]);
-        kernel::interleave(&mut targets, std::array::from_fn(|lane| target((segments.start + lane).min(segments.end - 1))));
+        kernel::interleave(targets, std::array::from_fn(|lane| target((segments.start + lane).min(segments.end - 1))));
         if segments.len() < LANES {
             let predictions = self.predictions.panel(at); // no error where there is no segment
             targets.iter_mut().zip(predictions).for_each(|(target, prediction)| target.take_from(segments.len(), *prediction));
@@ -302,28 +318,30 @@ impl Rollout {
     fn retrace_actions(&mut self, depth: Depth, setting: Setting) {
         let Setting { policy, dynamics, batch, choices, .. } = setting;
         let seen = dynamics.features().width();
-        let kinematic = dynamics.structure() == Structure::Kinematic;
-        let segments = &self.segments;
-        let taught = |i: usize| row(&choices.taught, FINGERS, batch.rows[segments[i].start + depth.j]);
+        let (positions, velocities) = (dynamics.layout().positions(), dynamics.layout().velocities());
+        let (segments, dim, fingers) = (&self.segments, self.actions.width(), &choices.fingers);
+        let taught = |i: usize| row(&choices.taught, fingers.len(), batch.rows[segments[i].start + depth.j]);
         self.taught.write_rows(0, depth.count, taught);
         if choices.action == ActionChoice::Sample {
-            self.noise.write_rows(0, depth.count, |i| row(batch.noise, JOINTS, segments[i].start + depth.j));
+            self.noise.write_rows(0, depth.count, |i| row(batch.noise, dim, segments[i].start + depth.j));
         }
         for (p, at, later) in depth.places() {
             let (d_given, d_state) = (&self.model.d_input.panel(at)[seen..], self.d_states.panel(p));
             let d_mean = if depth.j == 0 { self.d_first.panel_mut(p) } else { self.policy.d_output.panel_mut(later) };
-            for k in 0..JOINTS {
-                let straight_through = choices.straight_through && k >= ARM_JOINTS;
-                let known = d_state[k] * DT_S + d_state[JOINTS + k]; // of a joint that integrates its command
+            for k in 0..dim {
+                let straight_through = choices.straight_through && fingers.contains(&k);
+                // Of a joint that integrates its command.
+                let along = |joints: &Range<usize>| if k < joints.len() { d_state[joints.start + k] } else { Lanes::default() };
+                let known = along(&positions) * dynamics.dt_s() + along(&velocities);
                 let learned = d_given[k] / dynamics.action_scaling().std[k];
-                let d_action = match (straight_through, kinematic) {
+                let d_action = match (straight_through, dynamics.is_kinematic()) {
                     (true, _) => known,
                     (false, true) => learned + known,
                     (false, false) => learned,
                 };
                 d_mean[k] = d_action * policy.action_scaling().std[k];
-                if k >= ARM_JOINTS {
-                    d_mean[k] = d_mean[k] * self.taught.panel(p)[k - ARM_JOINTS];
+                if fingers.contains(&k) {
+                    d_mean[k] = d_mean[k] * self.taught.panel(p)[k - fingers.start];
                 }
                 if choices.action == ActionChoice::Sample {
                     self.d_log_std[k] += (d_mean[k] * self.noise.panel(p)[k]).sum() * exp_f32(policy.log_std[k]);

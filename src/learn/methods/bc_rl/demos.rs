@@ -2,6 +2,7 @@
 
 use crate::config::{ActionChoice, Objective, TrainSettings};
 use crate::error::{Error, Result};
+use crate::layout::Layout;
 use crate::learn::losses::behavior_cloning::{Batch, Choices, Workspace};
 use crate::learn::losses::{Acted, behavior_cloning, shards};
 use crate::learn::methods::batches::Batches;
@@ -21,13 +22,13 @@ pub struct Demos {
 impl Demos {
     /// In batches as `[train]` has them. L_BC is that of the mean action, in units of the demo actions, whatever `train.loss` and
     /// `train.action` say: lambda means the same in all presets.
-    pub fn new(settings: &TrainSettings) -> Self {
+    pub fn new(settings: &TrainSettings, layout: &Layout) -> Self {
         let of_mean = TrainSettings { loss: Objective::StandardisedMean, action: ActionChoice::Mean, ..settings.clone() };
         Demos {
             choices: Choices::new(&of_mean),
             batch: settings.bc_batch,
             acted: Acted::default(),
-            work: Workspace::new(settings.bc_batch),
+            work: Workspace::new(layout.action_dim(), settings.bc_batch),
             gradient: Vec::new(),
         }
     }

@@ -2,10 +2,9 @@
 
 use super::*;
 use crate::config::FeatureSet;
-use crate::learn::methods::ppo::toy::{GAMMA, Regulator, TASK};
+use crate::learn::methods::ppo::toy::{GAMMA, Regulator, demos, layout};
 use crate::learn::models::{Corpus, Policy, Reader};
 use crate::learn::run::{Checkpoint, Hooks, Method, run};
-use crate::learn::tests::testing::demos;
 
 fn settings() -> TrainSettings {
     let ppo = PpoSettings { total_steps: 6 * 128, worlds: 16, steps: 8, gamma: GAMMA, minibatch: 64, ..Default::default() };
@@ -24,7 +23,7 @@ fn settings() -> TrainSettings {
 }
 
 fn toy(settings: &TrainSettings) -> BcRl {
-    let (train, held_out) = (demos(TASK, 6, 30, 0), demos(TASK, 2, 30, 100));
+    let (train, held_out) = (demos(6, 30), demos(2, 20));
     let inputs = Inputs::new(train, held_out).expect("demos");
     BcRl::new(inputs, settings, 7, |_| Ok(Box::new(Regulator::new(11)))).expect("worlds")
 }
@@ -32,18 +31,18 @@ fn toy(settings: &TrainSettings) -> BcRl {
 #[test]
 fn what_is_added_is_lambda_times_the_gradient_of_l_bc() {
     let (settings, lambda) = (settings(), 0.7);
-    let corpus = Corpus::new(demos(TASK, 6, 30, 0), "training").expect("demos");
+    let corpus = Corpus::new(demos(6, 30), "training").expect("demos");
     let mut policy = Policy::new(&corpus, &settings, &mut stream(3, "bc-rl test", 0));
     let l_bc = |policy: &Policy, gradient: &mut [f32]| {
         let drawn = &mut stream(5, "bc-rl test", 0);
-        Demos::new(&settings).add_gradient(policy, &corpus, lambda, drawn, gradient).expect("a loss")
+        Demos::new(&settings, &layout()).add_gradient(policy, &corpus, lambda, drawn, gradient).expect("a loss")
     };
     let len = policy.net.params().len();
     // What stands there already, of the clipped objective, stays in the sum.
     let mut gradient = vec![2.0f32; len];
     l_bc(&policy, &mut gradient);
     let (h, mut largest) = (1e-2f32, 0.0f32);
-    for i in (0..len).step_by(len / 60).chain(len - 9..len) {
+    for i in (0..len).step_by(len / 60).chain(len - 2..len) {
         let mut at = |step: f32| {
             policy.net.params_mut()[i] += step;
             let loss = l_bc(&policy, &mut vec![0.0; len]);

@@ -22,7 +22,6 @@ use crate::learn::models::{Corpus, Dynamics, Policy, PolicySamples};
 use crate::learn::run::{EpochMetrics, Mean, Stage};
 use crate::nn::cosine;
 use crate::seed::stream;
-use crate::state::JOINTS;
 use rand::seq::SliceRandom;
 
 /// Behavior cloning alone, before Algorithm 1: d_conv passes .9 within a few hundred updates of Algorithm 1, which starves L_BC before
@@ -80,28 +79,29 @@ impl Hil {
     /// A fresh policy for these demos. Without a dynamics network alpha must be 0.
     ///
     /// # Errors
-    /// [`Error::Usage`] for a missing dynamics network or batches that memory cannot hold; [`Error::Failed`] when tasks differ.
+    /// [`Error::Usage`] for a missing dynamics network or batches that memory cannot hold; [`Error::Failed`] when layouts differ.
     pub fn new(inputs: Inputs, dynamics: Option<Dynamics>, alpha: Alpha, settings: &TrainSettings, seed: u64) -> Result<Self> {
         if alpha != Alpha::Fixed(0.0) && dynamics.is_none() {
             let help = "state cloning needs a dynamics network: run `hilt pretrain` first, or train with bc";
             return Err(Error::Usage(help.into()));
         }
-        inputs.same_task(dynamics.as_ref().map(Dynamics::task))?;
+        inputs.same_layout(dynamics.as_ref().map(|dynamics| &**dynamics.layout()))?;
         let settings = with_a_teacher_for_the_fingers(settings, alpha);
         let (corpus, units) = (&inputs.train, settings.hidden_units);
         let most_rows = settings.bc_batch.max(settings.batch * corpus.longest()).min(corpus.rows());
         affordable(most_rows, settings.hidden_layers, units, "train.batch, train.bc_batch or train.hidden_units")?;
         let policy = Policy::new(corpus, &settings, &mut stream(seed, "train.init", 0));
+        let dim = corpus.layout.action_dim();
         let work = Work {
             rows: Vec::with_capacity(most_rows),
             acted: Acted::new(&policy, most_rows),
             bc_choices: bc::Choices::new(&settings),
-            bc: bc::Workspace::new(most_rows),
+            bc: bc::Workspace::new(dim, most_rows),
             sc_choices: sc::Choices::new(&settings, corpus),
-            sc: sc::Workspace::new(most_rows),
+            sc: sc::Workspace::new(dim, most_rows),
             segments: Vec::with_capacity(most_rows),
-            noise: Vec::with_capacity(most_rows * JOINTS),
-            pushes: Pushes::new(&settings.sc, most_rows),
+            noise: Vec::with_capacity(most_rows * dim),
+            pushes: Pushes::new(&settings.sc, &corpus.layout, most_rows),
         };
         let per_epoch = per_epoch(corpus, &settings);
         Ok(Hil {
@@ -167,7 +167,8 @@ impl Hil {
             Some(model) if alpha > 0.0 => {
                 let (mut rng, lengths) = (stream(self.seed, "train.sc", self.draws), demos.iter().map(|d| corpus.demo(*d).len()));
                 draw_segments(lengths.clone(), sc_choices.rho, sc_choices.pairs, &mut rng, segments);
-                draw_noise(sc_choices.action == ActionChoice::Sample, rows.len(), &mut rng, noise);
+                let sampled = sc_choices.action == ActionChoice::Sample;
+                draw_noise(sampled, rows.len() * corpus.layout.action_dim(), &mut rng, noise);
                 pushes.draw(lengths, &mut rng);
                 let batch = sc::Batch { corpus, rows, demos: demos.len(), segments, noise, pushes: pushes.rows() };
                 let l_sc = state_cloning(&descent.policy, &model.dynamics, acted, batch, sc_choices, sc);

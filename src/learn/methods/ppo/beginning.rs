@@ -8,15 +8,14 @@ use super::{Ppo, sums_for};
 use crate::config::TrainSettings;
 use crate::env::Env;
 use crate::error::{Error, Result};
+use crate::layout::Layout;
 use crate::learn::limits::affordable;
 use crate::learn::models::{Policy, Scaling};
 use crate::math::ln;
 use crate::nn::{Adam, LANES, Mlp};
-use crate::robot::VELOCITY_LIMITS_RAD_S;
 use crate::seed::stream;
-use crate::state::JOINTS;
-use crate::task::Task;
 use rand::Rng;
+use std::sync::Arc;
 
 /// The last layer of the policy starts this small: the first actions are noise around standing still.
 const FIRST_ACTIONS: f32 = 0.01;
@@ -27,16 +26,26 @@ impl Ppo {
     /// Networks, and worlds at the beginning of their first episodes; `make` gives a world whose episodes are cut off after so many steps.
     ///
     /// # Errors
-    /// [`Error::Usage`] for settings out of range, [`Error::Failed`] when a world is of another task; what a first episode returns.
-    pub fn new(task: Task, settings: &TrainSettings, seed: u64, make: impl Fn(u32) -> Result<Box<dyn Env>>) -> Result<Self> {
+    /// [`Error::Usage`] for settings out of range, [`Error::Failed`] when a world is of another layout, or the layout does not say how large an
+    /// action may be; what a first episode returns.
+    pub fn new(
+        layout: &Arc<Layout>,
+        settings: &TrainSettings,
+        seed: u64,
+        make: impl Fn(u32) -> Result<Box<dyn Env>>,
+    ) -> Result<Self> {
         check_settings(settings)?;
+        let (dim, limits) = (layout.action_dim(), &layout.action_limits);
+        if limits.len() != dim {
+            return Err(Error::Failed(format!("{} does not say how large its actions may be, which PPO explores", layout.name)));
+        }
         let ppo = &settings.ppo;
-        let sight = Sight { task, set: settings.features, mask_dq: settings.mask_dq };
-        let unit = VELOCITY_LIMITS_RAD_S.map(|limit| (ppo.action_unit * limit) as f32);
-        let action = Scaling { mean: vec![0.0; JOINTS], std: unit.to_vec() };
-        let statistics = Statistics::new(sight);
+        let sight = Sight { layout: Arc::clone(layout), set: settings.features, mask_dq: settings.mask_dq };
+        let std = limits.iter().map(|limit| (ppo.action_unit * limit) as f32).collect();
+        let action = Scaling { mean: vec![0.0; dim], std };
+        let statistics = Statistics::new(&sight);
         let mut rng = stream(seed, INIT, 0);
-        let mut policy = Policy::with_scalings(statistics.features(sight), action, ppo.horizon_steps, settings, &mut rng);
+        let mut policy = Policy::with_scalings(statistics.features(&sight), action, ppo.horizon_steps, settings, &mut rng);
         policy.log_std.fill(ln(ppo.initial_std.max(settings.std_floor)) as f32);
         let (weights, biases) = policy.net.layer_ranges(policy.net.layers() - 1);
         policy.net.params_mut()[weights.start..biases.end].iter_mut().for_each(|w| *w *= FIRST_ACTIONS);
@@ -73,14 +82,14 @@ impl Ppo {
         let value = Mlp::new(&widths, settings.activation, rng);
         Ok(Ppo {
             records: (0..ppo.worlds / LANES).map(|_| Record::default()).collect(),
-            groups: worlds_in_groups(policy.task(), ppo.worlds, || make(policy.horizon_steps()))?,
+            groups: worlds_in_groups(policy.layout(), ppo.worlds, || make(policy.horizon_steps()))?,
             policy_adam: Adam::new(policy.net.params().len()),
-            std_adam: Adam::new(JOINTS),
+            std_adam: Adam::new(policy.log_std.len()),
             value_adam: Adam::new(value.params().len()),
             std_floor: settings.std_floor,
             settings: ppo,
             seed,
-            sight: Sight { task: policy.task(), set: settings.features, mask_dq: settings.mask_dq },
+            sight: Sight { layout: Arc::clone(policy.layout()), set: settings.features, mask_dq: settings.mask_dq },
             statistics: None,
             policy,
             value,
@@ -112,14 +121,14 @@ fn check_settings(settings: &TrainSettings) -> Result<()> {
     affordable(settings.ppo.minibatch, settings.hidden_layers, settings.hidden_units, keys)
 }
 
-fn worlds_in_groups(task: Task, worlds: usize, make: impl Fn() -> Result<Box<dyn Env>>) -> Result<Vec<Group>> {
+fn worlds_in_groups(layout: &Layout, worlds: usize, make: impl Fn() -> Result<Box<dyn Env>>) -> Result<Vec<Group>> {
     let world = |place: usize| {
         let env = make()?;
         let (seen, asked) = (env.observation_len(), env.action_len());
-        if (seen, asked) != (task.state_dim(), JOINTS) {
+        let (sees, gives, name) = (layout.state_dim(), layout.action_dim(), &layout.name);
+        if (seen, asked) != (sees, gives) {
             return Err(Error::Failed(format!(
-                "a world shows {seen} numbers and takes {asked}, but a policy of {task} sees {} and gives {JOINTS}",
-                task.state_dim()
+                "a world shows {seen} numbers and takes {asked}, but a policy of {name} sees {sees} and gives {gives}"
             )));
         }
         Episodes::new(env, place as u64, worlds as u64)

@@ -2,7 +2,6 @@
 
 use crate::env::{End, Env};
 use crate::error::Result;
-use crate::state::JOINTS;
 
 /// A world in the middle of an episode.
 pub struct Episodes {
@@ -61,11 +60,16 @@ impl Episodes {
     pub fn replay(&mut self, begun: u64, actions: &[f32]) -> Result<()> {
         self.begun = begun.saturating_sub(1);
         self.begin()?;
-        for action in actions.chunks_exact(JOINTS) {
+        for action in actions.chunks_exact(self.env.action_len()) {
             self.earned += f64::from(self.env.step(action, &mut self.observation).reward);
             self.actions.extend(action);
         }
         Ok(())
+    }
+
+    /// Steps of the present episode.
+    pub fn steps(&self) -> usize {
+        self.actions.len() / self.env.action_len()
     }
 
     /// One step; what ended comes with its last observation still in place.
@@ -73,7 +77,7 @@ impl Episodes {
         let outcome = self.env.step(action, &mut self.observation);
         self.actions.extend(action);
         self.earned += f64::from(outcome.reward);
-        let steps = (self.actions.len() / JOINTS) as u64;
+        let steps = self.steps() as u64;
         let finished = Finished { earned: self.earned, steps, success: outcome.success };
         (outcome.reward, outcome.end.map(|end| (end, finished)))
     }

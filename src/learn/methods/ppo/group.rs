@@ -9,7 +9,7 @@ use crate::learn::models::Policy;
 use crate::math::exp_f32;
 use crate::nn::{LANES, Lanes, Mlp, Panels, Pass, kernel, panels_of};
 use crate::seed::{normal, stream};
-use crate::state::JOINTS;
+use rand::Rng;
 use std::array::from_fn;
 
 /// Who acts, and who says what a state is worth.
@@ -61,6 +61,11 @@ pub struct Group {
     cut: Vec<(usize, usize)>,
     cut_off: Vec<f32>,
     state: Vec<Lanes>,
+    sigma: Vec<f32>,
+    /// Of one world: standard normal numbers, and the action that they make, in the policy's units and in those of the layout.
+    eps: Vec<f32>,
+    action: Vec<f32>,
+    command: Vec<f32>,
     pass: Pass,
     value_pass: Pass,
 }
@@ -88,7 +93,8 @@ impl Group {
             stream(actors.seed, "train.ppo.action", actors.iteration * world.worlds + world.place)
         });
         let (net, unit) = (&actors.policy.net, actors.policy.action_scaling());
-        let sigma: [f32; JOINTS] = from_fn(|i| exp_f32(actors.policy.log_std[i]));
+        self.sigma.clear();
+        self.sigma.extend(actors.policy.log_std.iter().map(|log_std| exp_f32(*log_std)));
         let log_sigma: f32 = actors.policy.log_std.iter().sum();
         for t in 0..actors.steps {
             check()?;
@@ -96,11 +102,12 @@ impl Group {
             self.pass.input.panel_mut(0).copy_from_slice(record.inputs.panel(t));
             net.forward(&mut self.pass, 0..1);
             for (lane, rng) in noise.iter_mut().enumerate() {
-                let eps: [f32; JOINTS] = from_fn(|_| normal(rng) as f32);
-                let action: [f32; JOINTS] = from_fn(|i| self.pass.output.get(lane, i) + sigma[i] * eps[i]);
-                record.actions.write_row(t * LANES + lane, &action);
-                record.log_prob[t].0[lane] = -0.5 * eps.iter().map(|e| e * e).sum::<f32>() - log_sigma;
-                self.step(t, lane, &from_fn(|i| unit.undo(i, action[i])), record)?;
+                self.draw(lane, rng);
+                self.command.clear();
+                self.command.extend(self.action.iter().enumerate().map(|(i, action)| unit.undo(i, *action)));
+                record.actions.write_row(t * LANES + lane, &self.action);
+                record.log_prob[t].0[lane] = -0.5 * self.eps.iter().map(|e| e * e).sum::<f32>() - log_sigma;
+                self.step(t, lane, record)?;
             }
         }
         self.see(actors.policy, actors.steps, 0, record);
@@ -108,10 +115,19 @@ impl Group {
         Ok(())
     }
 
+    /// The next action of a world.
+    fn draw(&mut self, lane: usize, rng: &mut impl Rng) {
+        self.eps.clear();
+        self.eps.extend(self.sigma.iter().map(|_| normal(rng) as f32));
+        let entries = self.sigma.iter().zip(&self.eps).enumerate();
+        self.action.clear();
+        self.action.extend(entries.map(|(i, (sigma, eps))| self.pass.output.get(lane, i) + sigma * eps));
+    }
+
     fn begin(&mut self, actors: &Actors, record: &mut Record) {
         let steps = actors.steps;
         record.inputs.reserve(actors.policy.features().width(), steps + 1);
-        record.actions.reserve(JOINTS, steps);
+        record.actions.reserve(actors.policy.log_std.len(), steps);
         for lanes in [&mut record.log_prob, &mut record.advantages, &mut record.returns, &mut self.rewards] {
             lanes.resize(steps, Lanes::default());
         }
@@ -125,14 +141,14 @@ impl Group {
 
     /// Writes what the policy sees before step `t`; the first `lanes` worlds count in the statistics.
     fn see(&mut self, policy: &Policy, t: usize, lanes: usize, record: &mut Record) {
-        self.state.resize(policy.task().state_dim(), Lanes::default());
+        self.state.resize(policy.layout().state_dim(), Lanes::default());
         kernel::interleave(&mut self.state, from_fn(|lane| self.worlds[lane].observation.as_slice()));
         look(policy.features(), &self.state, record.inputs.panel_mut(t), &mut record.sums, lanes);
     }
 
-    fn step(&mut self, t: usize, lane: usize, command: &[f32; JOINTS], record: &mut Record) -> Result<()> {
+    fn step(&mut self, t: usize, lane: usize, record: &mut Record) -> Result<()> {
         let world = &mut self.worlds[lane];
-        let (reward, ended) = world.step(command);
+        let (reward, ended) = world.step(&self.command);
         self.rewards[t].0[lane] = reward;
         self.ends[t][lane] = ended.map(|(end, _)| end);
         let Some((end, finished)) = ended else { return Ok(()) };

@@ -175,7 +175,7 @@ impl Ppo {
     fn take_in(&mut self) {
         let Some(statistics) = &mut self.statistics else { return };
         self.records.iter().for_each(|record| statistics.absorb(&record.sums));
-        self.policy.set_features(statistics.features(self.sight));
+        self.policy.set_features(statistics.features(&self.sight));
     }
 }
 

@@ -5,7 +5,6 @@ use crate::learn::losses::shards;
 use crate::learn::models::Policy;
 use crate::math::exp_f32;
 use crate::nn::{LANES, Lanes, Mlp, Pass};
-use crate::state::JOINTS;
 use rayon::prelude::*;
 
 /// The keys that shape the objective.
@@ -37,7 +36,7 @@ pub struct Work {
     /// Gradient for the policy's network.
     pub d_policy: Vec<f32>,
     /// Gradient for the logarithms of the standard deviations.
-    pub d_log_std: [f32; JOINTS],
+    pub d_log_std: Vec<f32>,
     /// Gradient for the value network.
     pub d_value: Vec<f32>,
 }
@@ -47,7 +46,10 @@ struct Shard {
     policy: Pass,
     value: Pass,
     seen: Seen,
-    d_log_std: [f32; JOINTS],
+    d_log_std: Vec<f32>,
+    precision: Vec<f32>,
+    /// (action - mean) / sigma in the panel at hand.
+    z: Vec<Lanes>,
 }
 
 impl Work {
@@ -77,7 +79,8 @@ impl Work {
 
     fn collect(&mut self, policy: &Policy, value: &Mlp, count: usize, choices: Choices) -> Seen {
         let mut seen = Seen::default();
-        self.d_log_std = [-choices.entropy; JOINTS];
+        self.d_log_std.clear();
+        self.d_log_std.resize(policy.log_std.len(), -choices.entropy);
         for shard in &self.shards[..count] {
             seen.policy_loss += shard.seen.policy_loss;
             seen.value_loss += shard.seen.value_loss;
@@ -108,21 +111,28 @@ impl Shard {
     /// Losses of the panels, out of `rows` in all shards, and the gradients with respect to the networks' outputs.
     fn losses(&mut self, policy: &Policy, records: &[Record], panels: &[(usize, usize)], rows: usize, choices: Choices) {
         let share = 1.0 / rows as f32;
-        let precision: [f32; JOINTS] = std::array::from_fn(|i| exp_f32(-policy.log_std[i]));
+        self.precision.clear();
+        self.precision.extend(policy.log_std.iter().map(|log_std| exp_f32(-log_std)));
         let log_sigma: f32 = policy.log_std.iter().sum();
-        (self.seen, self.d_log_std) = (Seen::default(), [0.0; JOINTS]);
+        self.seen = Seen::default();
+        self.d_log_std.clear();
+        self.d_log_std.resize(policy.log_std.len(), 0.0);
         for (p, (group, step)) in panels.iter().enumerate() {
             let (record, step) = (&records[*group], *step);
             let (mean, action) = (self.policy.output.panel(p), record.actions.panel(step));
-            let z: [Lanes; JOINTS] = std::array::from_fn(|i| (action[i] - mean[i]) * precision[i]);
-            let squares = z.iter().fold(Lanes::default(), |sum, z| sum + *z * *z);
+            self.z.clear();
+            self.z.extend(
+                action.iter().zip(mean).zip(&self.precision).map(|((action, mean), precision)| (*action - *mean) * *precision),
+            );
+            let squares = self.z.iter().fold(Lanes::default(), |sum, z| sum + *z * *z);
             let log_ratio = squares * -0.5 - Lanes::splat(log_sigma) - record.log_prob[step];
             let ratio = log_ratio.map(exp_f32);
             // The slope of minus the objective with respect to the logarithm of the probability.
             let slope = self.objective(ratio, log_ratio, record.advantages[step], share, choices.clip);
             for (i, d) in self.policy.d_output.panel_mut(p).iter_mut().enumerate() {
-                *d = slope * z[i] * precision[i];
-                self.d_log_std[i] += (slope * (z[i] * z[i] - Lanes::splat(1.0))).sum();
+                let z = self.z[i];
+                *d = slope * z * self.precision[i];
+                self.d_log_std[i] += (slope * (z * z - Lanes::splat(1.0))).sum();
             }
             let error = self.value.output.panel(p)[0] - record.returns[step];
             self.value.d_output.panel_mut(p)[0] = error * share;

@@ -7,7 +7,6 @@ use super::statistics::Statistics;
 use crate::learn::methods::optimizer::{push_adam, read_adam};
 use crate::learn::models::{Reader, vector};
 use crate::learn::run::past::{MOST_UPDATES, at_most};
-use crate::state::JOINTS;
 use crate::tensor::NamedTensor;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -37,7 +36,7 @@ impl Ppo {
         let worlds = || self.groups.iter().flat_map(|group| &group.worlds);
         let actions: Vec<f32> = worlds().flat_map(|world| world.actions.iter().copied()).collect();
         tensors.push(vector(ACTIONS, &actions));
-        let places: Vec<Place> = worlds().map(|w| Place { begun: w.begun, steps: w.actions.len() / JOINTS }).collect();
+        let places: Vec<Place> = worlds().map(|w| Place { begun: w.begun, steps: w.steps() }).collect();
         let meta = json!({
             "iteration": self.iteration,
             "updates": self.updates,
@@ -56,9 +55,9 @@ impl Ppo {
         self.restore_numbers(reader)?;
         let (places, actions) = self.places(reader)?;
         let worlds = self.groups.iter_mut().flat_map(|group| &mut group.worlds).collect::<Vec<_>>();
-        let mut rest = actions.as_slice();
+        let (mut rest, dim) = (actions.as_slice(), self.policy.log_std.len());
         let parts = worlds.into_iter().zip(places).map(|(world, place)| {
-            let (own, others) = rest.split_at(place.steps * JOINTS);
+            let (own, others) = rest.split_at(place.steps * dim);
             rest = others;
             (world, place, own)
         });
@@ -71,19 +70,19 @@ impl Ppo {
     fn restore_numbers(&mut self, reader: &Reader) -> Result<(), String> {
         let [policy, std, value]: [u32; 3] = reader.meta("adam_steps")?;
         let statistics: Option<Statistics> = reader.meta("statistics")?;
-        if statistics.is_some() != self.statistics.is_some() || statistics.iter().any(|s| !s.fit(self.sight)) {
+        if statistics.is_some() != self.statistics.is_some() || statistics.iter().any(|s| !s.fit(&self.sight)) {
             return Err("its statistics are not those of this task's features".into());
         }
         (self.iteration, self.updates) = (reader.meta("iteration")?, reader.meta("updates")?);
         let len = self.policy.net.params().len();
         self.policy.net.params_mut().copy_from_slice(&reader.tensor(POLICY, &[len])?);
         self.policy_adam = read_adam(reader, POLICY, len, policy)?;
-        self.policy.log_std = reader.log_std(STD)?;
-        self.std_adam = read_adam(reader, STD, JOINTS, std)?;
+        self.policy.log_std = reader.log_std(STD, self.policy.log_std.len())?;
+        self.std_adam = read_adam(reader, STD, self.policy.log_std.len(), std)?;
         let len = self.value.params().len();
         self.value.params_mut().copy_from_slice(&reader.tensor(VALUE, &[len])?);
         self.value_adam = read_adam(reader, VALUE, len, value)?;
-        statistics.iter().for_each(|known| self.policy.set_features(known.features(self.sight)));
+        statistics.iter().for_each(|known| self.policy.set_features(known.features(&self.sight)));
         self.statistics = statistics;
         Ok(())
     }
@@ -100,7 +99,7 @@ impl Ppo {
         }
         places.iter().try_for_each(|place| at_most("episodes of a world", place.begun, MOST_UPDATES))?;
         let steps: usize = places.iter().map(|p| p.steps).sum();
-        let actions = reader.tensor(ACTIONS, &[steps * JOINTS])?;
+        let actions = reader.tensor(ACTIONS, &[steps * self.policy.log_std.len()])?;
         Ok((places, actions))
     }
 }

@@ -1,20 +1,21 @@
 //! Running statistics of what the worlds have shown: the scalings of the policy's inputs.
 
 use crate::config::FeatureSet;
-use crate::learn::models::{Features, Relations, Scaling, derived_width, relations};
+use crate::layout::Layout;
+use crate::learn::models::{Features, Scaling, derived_width};
 use crate::nn::Lanes;
-use crate::task::Task;
 use serde::{Deserialize, Serialize};
+use std::sync::Arc;
 
 /// Smallest standard deviation of an entry (5 cm, 0.05 rad, 0.05 rad/s): before learning nothing moves the block, and what has not moved
 /// yet must not be blown up.
 const FLOOR: f64 = 0.05;
 
 /// What the policy sees of a state, before it is scaled.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Sight {
-    /// The task.
-    pub task: Task,
+    /// What a state holds.
+    pub layout: Arc<Layout>,
     /// What the policy sees of the state.
     pub set: FeatureSet,
     /// Whether joint velocities are hidden.
@@ -23,11 +24,11 @@ pub struct Sight {
 
 impl Sight {
     /// Entries of a state, then what kinematics derive.
-    fn widths(self) -> [usize; 2] {
-        [self.task.state_dim(), derived_width(self.task, self.set)]
+    fn widths(&self) -> [usize; 2] {
+        [self.layout.state_dim(), derived_width(&self.layout, self.set)]
     }
 
-    fn width(self) -> usize {
+    fn width(&self) -> usize {
         self.widths().iter().sum()
     }
 }
@@ -42,25 +43,25 @@ pub struct Statistics {
 
 impl Statistics {
     /// Nothing seen yet.
-    pub fn new(sight: Sight) -> Self {
+    pub fn new(sight: &Sight) -> Self {
         Statistics { count: 0.0, mean: vec![0.0; sight.width()], squares: vec![0.0; sight.width()] }
     }
 
     /// Whether they can be those of `sight`, as read from a file.
-    pub fn fit(&self, sight: Sight) -> bool {
+    pub fn fit(&self, sight: &Sight) -> bool {
         let numbers = || self.mean.iter().chain(&self.squares);
         let lengths = self.mean.len() == sight.width() && self.squares.len() == sight.width();
         lengths && self.count >= 1.0 && numbers().all(|v| v.is_finite()) && self.squares.iter().all(|v| *v >= 0.0)
     }
 
     /// The features with these scalings.
-    pub fn features(&self, sight: Sight) -> Features {
+    pub fn features(&self, sight: &Sight) -> Features {
         let [state, derived] = sight.widths();
         let scaling = |range: std::ops::Range<usize>| Scaling {
             mean: self.mean[range.clone()].iter().map(|m| *m as f32).collect(),
             std: self.squares[range].iter().map(|s| (s / self.count.max(1.0)).sqrt().max(FLOOR) as f32).collect(),
         };
-        Features::from_scaling(sight.task, sight.set, sight.mask_dq, scaling(0..state), scaling(state..state + derived))
+        Features::from_scaling(&sight.layout, sight.set, sight.mask_dq, scaling(0..state), scaling(state..state + derived))
     }
 
     /// Sums that are to be taken in.
@@ -111,8 +112,7 @@ impl Sums {
 
 /// Writes the inputs of a panel of states into `out`; its first `lanes` rows go into the sums.
 pub fn look(features: &Features, state: &[Lanes], out: &mut [Lanes], sums: &mut Sums, lanes: usize) {
-    let task = features.task();
-    let related = if features.needs_hand() { relations(task, state, &features.hand(state)) } else { Relations::default() };
+    let related = features.relations(state, &features.hand(state));
     sums.add(state, &related[..features.derived_scaling().width()], lanes);
     features.write(state, &related, out);
 }
@@ -120,17 +120,17 @@ pub fn look(features: &Features, state: &[Lanes], out: &mut [Lanes], sums: &mut 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::learn::tests::testing::random_states;
+    use crate::learn::tests::testing::{Toy, random_states};
     use crate::nn::{LANES, kernel};
 
     #[test]
     fn sums_taken_in_one_after_another_are_the_statistics_of_all() {
-        let sight = Sight { task: Task::Stack, set: FeatureSet::FkNear, mask_dq: false };
-        let (dim, rows) = (Task::Stack.state_dim(), 5 * LANES);
-        let states = random_states(Task::Stack, rows, 3);
-        let mut statistics = Statistics::new(sight);
+        let sight = Sight { layout: Toy::Stack.layout(), set: FeatureSet::FkNear, mask_dq: false };
+        let (dim, rows) = (Toy::Stack.layout().state_dim(), 5 * LANES);
+        let states = random_states(Toy::Stack, rows, 3);
+        let mut statistics = Statistics::new(&sight);
         for part in [0..LANES, LANES..4 * LANES, 4 * LANES..5 * LANES] {
-            let (features, mut sums) = (statistics.features(sight), statistics.sums());
+            let (features, mut sums) = (statistics.features(&sight), statistics.sums());
             for first in part.step_by(LANES) {
                 let mut state = vec![Lanes::default(); dim];
                 kernel::interleave(&mut state, std::array::from_fn(|lane| &states[(first + lane) * dim..][..dim]));
@@ -140,9 +140,9 @@ mod tests {
             statistics.absorb(&sums);
         }
         let whole = Scaling::fit(rows, dim, FLOOR as f32, |r, row| row.copy_from_slice(&states[r * dim..][..dim]));
-        let features = statistics.features(sight);
+        let features = statistics.features(&sight);
         let close = |a: &[f32], b: &[f32]| a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-5);
         assert!(close(&features.state_scaling().mean, &whole.mean) && close(&features.state_scaling().std, &whole.std));
-        assert!(statistics.fit(sight) && !statistics.fit(Sight { set: FeatureSet::Raw, ..sight }));
+        assert!(statistics.fit(&sight) && !statistics.fit(&Sight { set: FeatureSet::Raw, ..sight }));
     }
 }

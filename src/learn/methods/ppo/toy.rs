@@ -1,11 +1,12 @@
 //! A toy world whose optimum is known: a linear system with quadratic costs.
 
+use crate::demo::Demo;
 use crate::env::{End, Env, Outcome};
 use crate::error::Result;
+use crate::layout::{Holds, Layout, Span};
 use crate::seed::stream;
-use crate::state::JOINTS;
-use crate::task::Task;
 use rand::RngExt;
+use std::sync::Arc;
 
 /// Two joints are to come to 0: x' = x + GAIN u, a step costs x^2 + EFFORT u^2 each, and an episode is cut off.
 pub struct Regulator {
@@ -19,8 +20,13 @@ const EFFORT: f64 = 0.2;
 const STEPS: u32 = 20;
 /// What a reward is worth a step later.
 pub const GAMMA: f64 = 0.9;
-/// The task whose states and actions it borrows.
-pub const TASK: Task = Task::PickUp;
+/// What its rows hold: the two numbers, and their commands.
+pub fn layout() -> Arc<Layout> {
+    let span = |name: &str, holds| Span { name: name.into(), holds, entries: vec![format!("{name}.0"), format!("{name}.1")] };
+    let (state, action) = (vec![span("x", Holds::Numbers)], vec![span("u", Holds::Commands)]);
+    let (name, action_limits) = ("regulator".into(), vec![1.0; 2]);
+    Arc::new(Layout { name, period_s: 0.05, state, action, action_limits, aims: vec![], arm: None })
+}
 
 impl Regulator {
     /// Whose starts come from this seed.
@@ -29,18 +35,17 @@ impl Regulator {
     }
 
     fn show(&self, observation: &mut [f32]) {
-        observation.fill(0.0);
-        observation[..2].copy_from_slice(&self.x);
+        observation.copy_from_slice(&self.x);
     }
 }
 
 impl Env for Regulator {
     fn observation_len(&self) -> usize {
-        TASK.state_dim()
+        2
     }
 
     fn action_len(&self) -> usize {
-        JOINTS
+        2
     }
 
     fn reset(&mut self, episode: u64, observation: &mut [f32]) -> Result<()> {
@@ -61,18 +66,36 @@ impl Env for Regulator {
     }
 }
 
+/// Demos of a controller that is not the best, each of so many steps.
+pub fn demos(count: u64, steps: usize) -> Vec<Demo> {
+    let demo = |episode| {
+        let mut world = Regulator::new(5);
+        let (mut seen, mut states, mut actions) = ([0.0; 2], Vec::new(), Vec::new());
+        world.reset(episode, &mut seen).expect("a start");
+        world.left = u32::MAX;
+        states.extend(seen);
+        for t in 0..steps {
+            let action = seen.map(|x| 0.3 * (t as f32).sin() - 0.4 * x);
+            world.step(&action, &mut seen);
+            actions.extend(action);
+            states.extend(seen);
+        }
+        Demo::new(&layout(), states, actions.clone(), actions).expect("lengths match")
+    };
+    (0..count).map(demo).collect()
+}
+
 /// Mean discounted cost of a controller from some starts, over so many steps that the rest counts for nothing.
 pub fn cost(mut control: impl FnMut(&[f32]) -> [f32; 2]) -> f64 {
     let mut world = Regulator::new(12);
-    let mut seen = vec![0.0; TASK.state_dim()];
+    let mut seen = [0.0; 2];
     let mut total = 0.0;
     for episode in 0..20 {
         world.reset(episode, &mut seen).expect("a start");
         world.left = u32::MAX;
         let mut weight = 1.0;
         for _ in 0..100 {
-            let mut action = [0.0; JOINTS];
-            action[..2].copy_from_slice(&control(&seen));
+            let action = control(&seen);
             total += weight * (1.0 - f64::from(world.step(&action, &mut seen).reward));
             weight *= GAMMA;
         }

@@ -1,6 +1,8 @@
 //! Distances between convex primitives. All are exact or lower bounds, so "farther than" never errs on the wrong side.
 
-use crate::robot::{LINK_SHAPES, LinkPoses, Shape};
+use super::jaco::{LINK_SHAPES, Shape};
+use super::kinematics::LinkPoses;
+use super::model;
 use nalgebra::{Isometry3, Point3, Vector3};
 
 /// Rounds of the search for the point of a segment nearest to a box; each shrinks the interval by 0.62.
@@ -12,21 +14,43 @@ const PARALLEL: f64 = 1e-9;
 
 /// A primitive in the world frame.
 #[derive(Clone, Copy, Debug)]
-pub(super) enum Solid {
+pub enum Solid {
     /// Segment with a radius.
-    Capsule { from: Point3<f64>, to: Point3<f64>, radius_m: f64 },
+    Capsule {
+        /// One end \[m\].
+        from: Point3<f64>,
+        /// Other end \[m\].
+        to: Point3<f64>,
+        /// \[m\].
+        radius_m: f64,
+    },
     /// Box with its pose.
-    Cuboid { pose: Isometry3<f64>, half_m: Vector3<f64> },
+    Cuboid {
+        /// Centre and axes.
+        pose: Isometry3<f64>,
+        /// Half of its edges \[m\].
+        half_m: Vector3<f64>,
+    },
 }
 
 impl Solid {
     /// A box.
-    pub(super) fn cuboid(pose: Isometry3<f64>, half_m: [f64; 3]) -> Self {
+    pub fn cuboid(pose: Isometry3<f64>, half_m: [f64; 3]) -> Self {
         Solid::Cuboid { pose, half_m: half_m.into() }
     }
 
+    /// A primitive of a link that stands at `pose`.
+    pub fn of(shape: &model::Shape, pose: &Isometry3<f64>) -> Self {
+        match *shape {
+            model::Shape::Capsule { from_m, to_m, radius_m } => {
+                Solid::Capsule { from: pose * Point3::from(from_m), to: pose * Point3::from(to_m), radius_m }
+            }
+            model::Shape::Box { pose: at, half_m } => Solid::cuboid(pose * at, half_m),
+        }
+    }
+
     /// Centre and radius of a sphere around it.
-    fn sphere(&self) -> (Point3<f64>, f64) {
+    pub fn sphere(&self) -> (Point3<f64>, f64) {
         match self {
             Solid::Capsule { from, to, radius_m } => (nalgebra::center(from, to), nalgebra::distance(from, to) / 2.0 + radius_m),
             Solid::Cuboid { pose, half_m } => (pose.translation.vector.into(), half_m.norm()),
@@ -34,7 +58,7 @@ impl Solid {
     }
 
     /// Height of its lowest point \[m\].
-    pub(super) fn lowest_m(&self) -> f64 {
+    pub fn lowest_m(&self) -> f64 {
         match self {
             Solid::Capsule { from, to, radius_m } => from.z.min(to.z) - radius_m,
             Solid::Cuboid { pose, half_m } => {
@@ -45,13 +69,13 @@ impl Solid {
     }
 
     /// Whether the two are at least `margin_m` apart.
-    pub(super) fn farther_than(&self, other: &Solid, margin_m: f64) -> bool {
+    pub fn farther_than(&self, other: &Solid, margin_m: f64) -> bool {
         let ((a, reach_a), (b, reach_b)) = (self.sphere(), other.sphere());
         nalgebra::distance(&a, &b) - reach_a - reach_b >= margin_m || self.distance_m(other) >= margin_m
     }
 
     /// Distance (0 or less when they overlap; between boxes a lower bound) \[m\].
-    pub(super) fn distance_m(&self, other: &Solid) -> f64 {
+    pub fn distance_m(&self, other: &Solid) -> f64 {
         match (self, other) {
             (Solid::Capsule { from: a, to: b, radius_m: r }, Solid::Capsule { from: c, to: d, radius_m: s }) => {
                 segment_to_segment_m([a, b], [c, d]) - r - s
@@ -66,7 +90,7 @@ impl Solid {
 }
 
 /// The arm's primitives at these link poses, in the order of [`LINK_SHAPES`].
-pub(super) fn place_links(poses: &LinkPoses) -> [Solid; LINK_SHAPES.len()] {
+pub fn place_links(poses: &LinkPoses) -> [Solid; LINK_SHAPES.len()] {
     LINK_SHAPES.map(|s| {
         let pose = &poses[s.link];
         match s.shape {

@@ -1,0 +1,197 @@
+//! Robots from files: what is read, what is doubtful, what is refused.
+
+use assert_cmd::Command;
+use hilt::robot::description::Read;
+use hilt::robot::file;
+use hilt::robot::model::{JointKind, Shape};
+use std::fs;
+use std::path::{Path, PathBuf};
+
+const TOML: &str = include_str!("../fixtures/robots/five.toml");
+const URDF: &str = include_str!("../fixtures/robots/five.urdf");
+
+/// The fixture with parts of its files replaced.
+fn spoilt(dir: &Path, toml: &[(&str, &str)], urdf: &[(&str, &str)]) -> PathBuf {
+    let spoil = |text: &str, replaced: &[(&str, &str)]| {
+        replaced.iter().fold(text.to_string(), |text, (from, to)| {
+            assert!(text.contains(from), "the fixture has no {from}");
+            text.replacen(from, to, 1)
+        })
+    };
+    fs::write(dir.join("five.urdf"), spoil(URDF, urdf)).expect("a file");
+    fs::write(dir.join("five.toml"), spoil(TOML, toml)).expect("a file");
+    fs::copy("fixtures/robots/wrist.stl", dir.join("wrist.stl")).expect("a file");
+    dir.join("five.toml")
+}
+
+fn refused(toml: &[(&str, &str)], urdf: &[(&str, &str)]) -> String {
+    let dir = tempfile::tempdir().expect("a directory");
+    file::read(&spoilt(dir.path(), toml, urdf)).expect_err("refused").to_string()
+}
+
+#[test]
+fn a_robot_of_five_joints_is_read() {
+    let Read { robot, remarks } = file::read(Path::new("fixtures/robots/five.toml")).expect("a robot");
+    assert_eq!((robot.arm, robot.joints.len(), robot.links.len()), (5, 7, 8));
+    let names: Vec<&str> = robot.joints.iter().map(|joint| joint.name.as_str()).collect();
+    assert_eq!(names, ["turn", "shoulder", "elbow", "bend", "roll", "left", "right"]);
+    assert!(robot.joints[0].continuous && robot.joints[5].kind == JointKind::Prismatic);
+    assert_eq!((robot.joints[4].effort, robot.joints[6].motor.friction, robot.joints[6].parent), (12.0, 2.0, 5));
+
+    // What is fixed is one link: wrist with its cover, palm with its camera; axes other than z change frames, not places.
+    let wrist = &robot.links[4];
+    assert!((wrist.inertia.mass_kg - 0.6).abs() < 1e-12 && (robot.links[5].inertia.mass_kg - 0.35).abs() < 1e-12);
+    let tool = robot.tool_pose(&robot.ready);
+    assert!((tool.translation.vector - nalgebra::Vector3::new(0.45, 0.0, 0.30)).norm() < 1e-4, "{tool}");
+    assert!(tool.rotation.angle() < 1e-4, "{tool}");
+    assert!(matches!(robot.links[2].shapes[..], [Shape::Capsule { radius_m: 0.03, .. }]), "{:?}", robot.links[2].shapes);
+    let Shape::Box { half_m, .. } = wrist.shapes[0] else { panic!("a mesh becomes a box") };
+    assert!(half_m.iter().zip([0.02, 0.02, 0.04]).all(|(a, b)| (a - b).abs() < 1e-6), "{half_m:?}");
+
+    let said = remarks.join("\n");
+    for part in ["a cylinder of link foot", "mesh of link cover", "finger right mimics left", "camera_tilt is held at 0.3"] {
+        assert!(said.contains(part), "{part} is not in {said}");
+    }
+}
+
+#[test]
+fn the_jacobian_of_a_read_robot_equals_finite_differences() {
+    let robot = file::read(Path::new("fixtures/robots/five.toml")).expect("a robot").robot;
+    let q: Vec<f64> = robot.ready.iter().enumerate().map(|(i, v)| v + 0.1 * i as f64).collect();
+    let (_, jacobian) = robot.tool_jacobian(&q);
+    for i in 0..robot.arm {
+        let moved = |by: f64| {
+            let mut q = q.clone();
+            q[i] += by;
+            robot.tool_pose(&q)
+        };
+        let (plus, minus) = (moved(1e-6), moved(-1e-6));
+        let linear = (plus.translation.vector - minus.translation.vector) / 2e-6;
+        let angular = (plus.rotation * minus.rotation.inverse()).scaled_axis() / 2e-6;
+        assert!((linear - jacobian.fixed_view::<3, 1>(0, i)).norm() < 1e-7, "joint {i}");
+        assert!((angular - jacobian.fixed_view::<3, 1>(3, i)).norm() < 1e-7, "joint {i}");
+    }
+}
+
+#[test]
+fn impossible_descriptions_are_refused_with_what_to_do() {
+    let mesh = "package://five_description/wrist.stl";
+    let cases: [(&[(&str, &str)], &[(&str, &str)], &str); 27] = [
+        (
+            &[],
+            &[("<inertial><origin xyz=\"0 0 0.1\"/>", "<nothing>"), ("ixz=\"0\" iyz=\"0\"/></inertial>", "/></nothing>")],
+            "\"post\" moves, but has no mass",
+        ),
+        (&[], &[("<mass value=\"2\"/>", "")], "no <mass>"),
+        (&[], &[("<mass value=\"2\"/>", "<mass value=\"two\"/>")], "line 12, <mass>: value is \"two\""),
+        (&[], &[("ixx=\"0.01\" iyy=\"0.01\" izz=\"0.004\"", "ixx=\"-1\" iyy=\"0.01\" izz=\"0.004\"")], "each must be above 0"),
+        (&[], &[(mesh, "package://five_description/gone.stl")], "the mesh package://five_description/gone.stl is not there"),
+        (&[], &[(mesh, "five.urdf")], "hilt reads meshes in STL"),
+        (&[], &[("<child link=\"upper\"/>", "<child link=\"post\"/>")], "\"post\" hangs on two joints"),
+        (&[], &[("<parent link=\"foot\"/>", "<parent link=\"palm\"/>")], "loop"),
+        (
+            &[],
+            &[("<parent link=\"post\"/><child link=\"upper\"/>", "<parent link=\"poost\"/><child link=\"upper\"/>")],
+            "there is no link \"poost\"; did you mean post",
+        ),
+        (&[("fingers = [\"left\", \"right\"]", "fingers = [\"left\"]")], &[], "an arm of 5 joints and 1 fingers"),
+        (&[("camera_tilt = 0.3", "")], &[], "\"camera_tilt\" moves, but is neither under arm nor under fingers"),
+        (&[("arm = [\"turn\", \"shoulder\"", "arm = [\"shoulder\", \"turn\"")], &[], "name them from the foot to the hand"),
+        (&[("\"bend\", \"roll\"]", "\"bend\", \"rol\"]")], &[], "there is no joint \"rol\" in the URDF; did you mean roll"),
+        (&[], &[("name=\"elbow\" type=\"revolute\"", "name=\"elbow\" type=\"planar\"")], "type \"planar\"; allowed: revolute"),
+        (&[], &[("name=\"elbow\" type=\"revolute\"", "name=\"elbow\" type=\"floating\"")], "type \"floating\""),
+        (&[], &[("name=\"elbow\" type=\"revolute\"", "name=\"elbow\" type=\"prismatic\"")], "joint \"elbow\" of the arm slides"),
+        (
+            &[],
+            &[("velocity=\"2\" effort=\"40\"/>", "velocity=\"2\" effort=\"40\"/><mimic joint=\"bend\"/>")],
+            "joint \"elbow\" of the arm mimics \"bend\"",
+        ),
+        (
+            &[],
+            &[("lower=\"-2\" upper=\"2\" velocity=\"1.5\"", "lower=\"-2\" upper=\"2\"")],
+            "\"shoulder\" has no velocity in its <limit>",
+        ),
+        (&[], &[("lower=\"-2\" upper=\"2\"", "lower=\"2\" upper=\"-2\"")], "limits 2 to -2"),
+        (&[], &[("lower=\"-2\" upper=\"2\"", "")], "joint \"shoulder\" has no limits"),
+        (&[("0.44781", "2.5")], &[], "joint \"shoulder\" is at 2.5, its limits are -2 to 2"),
+        (&[("opened = [0.045, 0.045]", "opened = [0.045]")], &[], "hand.opened has 1 positions, 2 are needed"),
+        (&[("[fixed]", "[fixd]")], &[], "unknown field `fixd`"),
+        (&[], &[("<axis xyz=\"0 0 1\"/>", "<axis xyz=\"0 0 0\"/>")], "its axis is no direction"),
+        (&[], &[("<box size=\"0.08 0.08 0.16\"/>", "<box size=\"0.08 0.08\"/>")], "size has 2 numbers, 3 are needed"),
+        (
+            &[],
+            &[("<robot name=\"five\">", "<!DOCTYPE robot [<!ENTITY a \"aaaa\">]><robot name=\"five\">")],
+            "not a readable XML document",
+        ),
+        (
+            &[],
+            &[("<robot name=\"five\">", "<robot name=\"five\" xmlns:xacro=\"http://www.ros.org/wiki/xacro\"><xacro:arm/>")],
+            "expand the document first",
+        ),
+    ];
+    for (toml, urdf, said) in cases {
+        let why = refused(toml, urdf);
+        assert!(why.contains(said) && why.contains("five."), "\"{said}\" is not in: {why}");
+    }
+}
+
+#[test]
+fn the_page_shows_every_key_and_is_read_as_it_stands() {
+    let page = fs::read_to_string("docs/add-a-robot.md").expect("the page");
+    let toml = page.split("```toml\n").nth(1).and_then(|rest| rest.split("```").next()).expect("a description");
+    let dir = tempfile::tempdir().expect("a directory");
+    let path = spoilt(dir.path(), &[], &[]);
+    fs::write(&path, toml).expect("a file");
+    let read = file::read(&path).expect("the page's robot");
+    assert_eq!((read.robot.posture.len(), read.robot.joints[4].effort), (1, 12.0));
+    assert!(matches!(read.robot.links[0].shapes[..], [Shape::Capsule { .. }]), "{:?}", read.robot.links[0].shapes);
+    for key in
+        ["name", "urdf", "arm", "fingers", "fixed", "tool", "ready", "hand", "posture", "motors", "joints", "shapes", "packages"]
+    {
+        assert!(toml.contains(key), "{key} is not on the page");
+    }
+}
+
+fn hilt(words: &[&str]) -> Command {
+    let mut command = Command::cargo_bin("hilt").expect("the binary");
+    command.args(words);
+    command
+}
+
+#[test]
+fn check_says_what_is_doubtful_and_draws_the_robot() {
+    let dir = tempfile::tempdir().expect("a directory");
+    let said = |path: &Path| {
+        let output = hilt(&["robot", "check", path.to_str().expect("plain")]).output().expect("it runs");
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+        String::from_utf8(output.stdout).expect("text")
+    };
+    let sound = said(Path::new("fixtures/robots/five.toml"));
+    assert!(sound.contains("nothing doubtful") && sound.contains("opposing fingers: left and right"), "{sound}");
+    assert!(sound.contains("0.45 m") && sound.contains('#'), "{sound}");
+    let doubtful = spoilt(
+        dir.path(),
+        &[("armature = 0.1", "armature = 0.0"), ("0.44781, 1.64861", "0.44781, 1.2")],
+        &[
+            ("effort=\"60\"", "effort=\"2\""),
+            ("ixx=\"0.02\" iyy=\"0.02\"", "ixx=\"0.09\" iyy=\"0.02\""),
+            ("<axis xyz=\"0 -1 0\"/>", "<axis xyz=\"0 1 0\"/>"),
+        ],
+    );
+    let said = said(&doubtful);
+    for part in [
+        "no reflected inertia",
+        "leans",
+        "shoulder bears",
+        "link upper: moments of inertia",
+        "no two fingers close on each other",
+    ] {
+        assert!(said.contains(part), "{part} is not in {said}");
+    }
+
+    let png = dir.path().join("five.png");
+    hilt(&["robot", "check", "fixtures/robots/five.toml", "--json", "--png", png.to_str().expect("plain")]).assert().success();
+    assert!(fs::read(&png).expect("a picture").starts_with(b"\x89PNG"));
+    hilt(&["robot", "check", "puma"]).assert().code(2);
+    hilt(&["robot", "check", "gone.toml"]).assert().code(1);
+}
