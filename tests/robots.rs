@@ -75,8 +75,8 @@ fn the_jacobian_of_a_read_robot_equals_finite_differences() {
 
 #[test]
 fn impossible_descriptions_are_refused_with_what_to_do() {
-    let mesh = "package://five_description/wrist.stl";
-    let cases: [(&[(&str, &str)], &[(&str, &str)], &str); 27] = [
+    type Spoiling = &'static [(&'static str, &'static str)];
+    let cases: [(Spoiling, Spoiling, &str); 27] = [
         (
             &[],
             &[("<inertial><origin xyz=\"0 0 0.1\"/>", "<nothing>"), ("ixz=\"0\" iyz=\"0\"/></inertial>", "/></nothing>")],
@@ -85,8 +85,12 @@ fn impossible_descriptions_are_refused_with_what_to_do() {
         (&[], &[("<mass value=\"2\"/>", "")], "no <mass>"),
         (&[], &[("<mass value=\"2\"/>", "<mass value=\"two\"/>")], "line 12, <mass>: value is \"two\""),
         (&[], &[("ixx=\"0.01\" iyy=\"0.01\" izz=\"0.004\"", "ixx=\"-1\" iyy=\"0.01\" izz=\"0.004\"")], "each must be above 0"),
-        (&[], &[(mesh, "package://five_description/gone.stl")], "the mesh package://five_description/gone.stl is not there"),
-        (&[], &[(mesh, "five.urdf")], "hilt reads meshes in STL"),
+        (
+            &[],
+            &[("package://five_description/wrist.stl", "package://five_description/gone.stl")],
+            "the mesh package://five_description/gone.stl is not there",
+        ),
+        (&[], &[("package://five_description/wrist.stl", "five.urdf")], "hilt reads meshes in STL"),
         (&[], &[("<child link=\"upper\"/>", "<child link=\"post\"/>")], "\"post\" hangs on two joints"),
         (&[], &[("<parent link=\"foot\"/>", "<parent link=\"palm\"/>")], "loop"),
         (

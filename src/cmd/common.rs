@@ -4,6 +4,7 @@ use super::places::Places;
 use crate::config::{Pipeline, Preset, Source, Stage};
 use crate::data::{ContentHash, Provenance};
 use crate::error::{Error, Result};
+use crate::layout::Layout;
 use crate::plan::check_ready_pose;
 use crate::task::Task;
 use std::path::{Path, PathBuf};
@@ -127,6 +128,25 @@ pub fn same_task(path: &Path, made_for: Task, task: Task) -> Result<()> {
     Err(Error::input(
         path,
         format!("was made for task {made_for}, but task {task} is asked for; give --task {made_for} or another file"),
+    ))
+}
+
+/// Refuses a network whose rows are not those of the task.
+///
+/// # Errors
+/// [`Error::Input`] with the lengths of both.
+pub fn same_layout(path: &Path, layout: &Layout, task: Task) -> Result<()> {
+    let ours = task.layout();
+    if *layout == *ours {
+        return Ok(());
+    }
+    let [theirs, ours] =
+        [layout, &*ours].map(|l| format!("states of {} numbers and actions of {}", l.state_dim(), l.action_dim()));
+    Err(Error::input(
+        path,
+        format!(
+            "was trained on {theirs}, this robot in this task has {ours}, or in another order (\"layout\" of its description); train it anew"
+        ),
     ))
 }
 

@@ -1,4 +1,4 @@
-use super::common::{SettingsArgs, path_or, same_task};
+use super::common::{SettingsArgs, path_or, same_layout, same_task};
 use super::places::{Content, Places, beside};
 use super::{Console, Context, Outcome, output, train};
 use crate::config::{Pipeline, Stage};
@@ -118,14 +118,7 @@ fn read_policy(path: &Path, pipeline: &Pipeline) -> Result<(Policy, Provenance, 
     let (tensors, meta, made, content) = weights::read_hashed(path, train::KIND)?;
     same_task(path, made.task, pipeline.task)?;
     let policy = Policy::from_tensors(&tensors, &with_layout(meta)).map_err(|why| Error::input(path, why))?;
-    let (layout, ours) = (policy.layout(), pipeline.task.layout());
-    if *layout != ours {
-        let [theirs, ours] = [layout, &ours].map(|l| format!("{} numbers and moves {}", l.state_dim(), l.action_dim()));
-        let what = format!(
-            "sees {theirs}, this robot in this task shows {ours}, or in another order (\"layout\" of its description); train it anew"
-        );
-        return Err(Error::input(path, what));
-    }
+    same_layout(path, policy.layout(), pipeline.task)?;
     Ok((policy, made, content))
 }
 

@@ -1,5 +1,5 @@
 use super::checkpoint::{self, Keeper};
-use super::common::{SettingsArgs, path_or, same_task};
+use super::common::{SettingsArgs, path_or, same_layout, same_task};
 use super::epochs::Epochs;
 use super::places::{Content, beside};
 use super::{Console, Context, Outcome, pretrain};
@@ -155,5 +155,7 @@ fn read_demos(dir: &Path, pipeline: &Pipeline) -> Result<(Inputs, ContentHash)> 
 fn read_dynamics(path: &Path, task: Task) -> Result<(Dynamics, ContentHash)> {
     let (tensors, meta, made, content) = weights::read_hashed(path, pretrain::KIND)?;
     same_task(path, made.task, task)?;
-    Ok((Dynamics::from_tensors(&tensors, &with_layout(meta)).map_err(|why| Error::input(path, why))?, content))
+    let dynamics = Dynamics::from_tensors(&tensors, &with_layout(meta)).map_err(|why| Error::input(path, why))?;
+    same_layout(path, dynamics.layout(), task)?;
+    Ok((dynamics, content))
 }

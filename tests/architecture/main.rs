@@ -40,6 +40,7 @@ const FLOW: [(&str, &[&str]); 20] = [
             "env",
             "eval",
             "experiment",
+            "layout",
             "learn",
             "nn",
             "plan",

@@ -48,7 +48,7 @@ impl BcRl {
         let cloning = Hil::new(inputs, None, Alpha::Fixed(0.0), settings, seed)?;
         let rate = settings.bc_rl.learning_rate;
         let ppo = PpoSettings { learning_rate: rate, final_learning_rate: rate, ..settings.ppo.clone() };
-        let demos = Demos::new(settings, &cloning.policy().layout());
+        let demos = Demos::new(settings, cloning.policy().layout());
         let ppo = Ppo::going_on(cloning.policy().clone(), &TrainSettings { ppo, ..settings.clone() }, seed, make)?;
         Ok(BcRl { settings: settings.bc_rl.clone(), seed, demos, cloning, ppo, by_rewards: false })
     }

@@ -75,7 +75,7 @@ pub fn demos(count: u64, steps: usize) -> Vec<Demo> {
         world.left = u32::MAX;
         states.extend(seen);
         for t in 0..steps {
-            let action = seen.map(|x| 0.3 * (t as f32).sin() - 0.4 * x);
+            let action = seen.map(|x| if t % 2 == 0 { 0.2 } else { -0.3 } - 0.4 * x);
             world.step(&action, &mut seen);
             actions.extend(action);
             states.extend(seen);
