@@ -1,8 +1,8 @@
 //! Robots from files: what is read, what is doubtful, what is refused.
 
 use assert_cmd::Command;
-use hilt::robot::description::Read;
 use hilt::robot::file;
+use hilt::robot::file::description::Read;
 use hilt::robot::model::{JointKind, Shape};
 use std::fs;
 use std::path::{Path, PathBuf};

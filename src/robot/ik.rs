@@ -168,7 +168,7 @@ fn box_rows(n: usize) -> CscMatrix<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::robot::{READY_Q_RAD, built_in::jaco};
+    use crate::robot::{READY_Q_RAD, file::built_in::jaco};
     use crate::state::ARM_JOINTS;
     use nalgebra::{Translation3, UnitQuaternion};
 

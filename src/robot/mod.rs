@@ -1,19 +1,14 @@
 //! The arm: constants of the Kinova Jaco j2n6s300, forward kinematics, Jacobian, differential inverse kinematics, URDF. And robots as data, from two
 //! files each: [`Robot`] is what they say, [`file::read`] reads them.
 
-mod assemble;
-pub mod built_in;
 pub mod check;
 pub mod collision;
-pub mod description;
 pub mod file;
 pub mod ik;
 pub mod jaco;
 pub mod kinematics;
-mod mesh;
 pub mod model;
 pub mod urdf;
-mod xml;
 
 pub use ik::{Ik, Unreachable};
 pub use jaco::{LINK_SHAPES, LinkShape, POSITION_LIMITS_RAD, READY_Q_RAD, Shape, VELOCITY_LIMITS_RAD_S};

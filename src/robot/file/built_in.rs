@@ -2,14 +2,14 @@
 
 use super::assemble::assemble;
 use super::description::Description;
-use super::model::Robot;
 use super::xml;
+use crate::robot::model::Robot;
 use std::sync::{Arc, LazyLock};
 
 /// Name, TOML and URDF of each.
 const FILES: [(&str, &str, &str); 2] = [
-    ("jaco", include_str!("../../pipelines/robots/jaco.toml"), include_str!("../../pipelines/robots/jaco.urdf")),
-    ("panda", include_str!("../../pipelines/robots/panda.toml"), include_str!("../../pipelines/robots/panda.urdf")),
+    ("jaco", include_str!("../../../pipelines/robots/jaco.toml"), include_str!("../../../pipelines/robots/jaco.urdf")),
+    ("panda", include_str!("../../../pipelines/robots/panda.toml"), include_str!("../../../pipelines/robots/panda.urdf")),
 ];
 
 static JACO: LazyLock<Arc<Robot>> =

@@ -1,10 +1,17 @@
 //! A robot from its two files: a URDF, and a small TOML beside it that says what a URDF cannot.
 
-use super::assemble::assemble;
-use super::description::{Description, Read};
-use super::xml;
+mod assemble;
+mod body;
+pub mod built_in;
+pub mod description;
+mod mesh;
+mod tree;
+mod xml;
+
 use crate::error::{Error, Result};
 use crate::words::shown;
+use assemble::assemble;
+use description::{Description, Read};
 use std::fs;
 use std::path::{Path, PathBuf};
 

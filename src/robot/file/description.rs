@@ -1,6 +1,6 @@
 //! What a robot's TOML file says.
 
-use super::model::Robot;
+use crate::robot::model::Robot;
 use serde::Deserialize;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
