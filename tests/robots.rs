@@ -76,7 +76,7 @@ fn the_jacobian_of_a_read_robot_equals_finite_differences() {
 #[test]
 fn impossible_descriptions_are_refused_with_what_to_do() {
     type Spoiling = &'static [(&'static str, &'static str)];
-    let cases: [(Spoiling, Spoiling, &str); 27] = [
+    let cases: [(Spoiling, Spoiling, &str); 29] = [
         (
             &[],
             &[("<inertial><origin xyz=\"0 0 0.1\"/>", "<nothing>"), ("ixz=\"0\" iyz=\"0\"/></inertial>", "/></nothing>")],
@@ -120,6 +120,15 @@ fn impossible_descriptions_are_refused_with_what_to_do() {
         (&[("0.44781", "2.5")], &[], "joint \"shoulder\" is at 2.5, its limits are -2 to 2"),
         (&[("opened = [0.045, 0.045]", "opened = [0.045]")], &[], "hand.opened has 1 positions, 2 are needed"),
         (&[("[fixed]", "[fixd]")], &[], "unknown field `fixd`"),
+        (&[("xyz_m = [0.0, 0.0, 0.11]", "xyz_m = [0.0, nan, 0.11]")], &[], "tool.xyz_m.1 is NaN"),
+        (
+            &[(
+                "[packages]",
+                "[shapes]\nfoot = [{ capsule = { from_m = [0, 0, 0], to_m = [0, 0, 1], radius_m = -0.1 } }]\n\n[packages]",
+            )],
+            &[],
+            "shapes.foot: a size of -0.1 m",
+        ),
         (&[], &[("<axis xyz=\"0 0 1\"/>", "<axis xyz=\"0 0 0\"/>")], "its axis is no direction"),
         (&[], &[("<box size=\"0.08 0.08 0.16\"/>", "<box size=\"0.08 0.08\"/>")], "size has 2 numbers, 3 are needed"),
         (

@@ -148,9 +148,21 @@ impl Description {
     pub fn parse(text: &str) -> std::result::Result<Self, String> {
         let table: toml::Table =
             text.parse().map_err(|e: toml::de::Error| format!("not valid TOML: {}", e.to_string().trim_end()))?;
+        finite("", &toml::Value::Table(table.clone()))?;
         serde_path_to_error::deserialize(toml::Value::Table(table)).map_err(|e| match e.path().to_string() {
             key if key == "." => e.inner().to_string().trim_end().to_string(),
             key => format!("{key}: {}", e.inner().to_string().trim_end()),
         })
+    }
+}
+
+/// TOML knows inf and nan; no number of a robot is one.
+fn finite(key: &str, value: &toml::Value) -> Result<(), String> {
+    let below = |part: &str| if key.is_empty() { part.to_string() } else { format!("{key}.{part}") };
+    match value {
+        toml::Value::Float(number) if !number.is_finite() => Err(format!("{key} is {number}, a finite number is needed")),
+        toml::Value::Array(values) => values.iter().enumerate().try_for_each(|(i, value)| finite(&below(&i.to_string()), value)),
+        toml::Value::Table(table) => table.iter().try_for_each(|(part, value)| finite(&below(part), value)),
+        _ => Ok(()),
     }
 }

@@ -1,6 +1,6 @@
 //! Whether links and joints make a robot at all, and whether the description names what is there.
 
-use super::description::Description;
+use super::description::{Description, ShapeEntry};
 use super::xml::{JointElement, Urdf};
 use crate::layout::MOST_ARM_JOINTS;
 use crate::words::{did_you_mean, shown};
@@ -96,7 +96,16 @@ pub fn check_names(description: &Description, urdf: &Urdf) -> Result<(), String>
             return Err(format!("posture: \"{}\" is no joint of the arm{}", shown(name), did_you_mean(name, arm)));
         }
     }
-    description.shapes.keys().try_for_each(|name| known("shapes", "link", name, &links))?;
+    for (name, shapes) in &description.shapes {
+        known("shapes", "link", name, &links)?;
+        let sizes = |shape: &ShapeEntry| match *shape {
+            ShapeEntry::Capsule { radius_m, .. } => vec![radius_m],
+            ShapeEntry::Box { half_m, .. } => half_m.to_vec(),
+        };
+        if let Some(size) = shapes.iter().flat_map(sizes).find(|size| *size <= 0.0) {
+            return Err(format!("shapes.{}: a size of {size} m; it must be above 0", shown(name)));
+        }
+    }
     let (arm, fingers) = (description.arm.len(), description.fingers.len());
     if !(1..=MOST_ARM_JOINTS).contains(&arm) || !(2..=MOST_FINGERS).contains(&fingers) {
         return Err(format!(
