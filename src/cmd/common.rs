@@ -2,11 +2,14 @@
 
 use super::places::Places;
 use crate::config::{Pipeline, Preset, Source, Stage};
-use crate::data::{ContentHash, Provenance};
+use crate::data::{ContentHash, Provenance, weights};
 use crate::error::{Error, Result};
 use crate::layout::Layout;
 use crate::plan::check_ready_pose;
 use crate::task::Task;
+use crate::tasks::with_layout;
+use crate::tensor::NamedTensor;
+use serde_json::Value;
 use std::path::{Path, PathBuf};
 
 /// Where artefacts go unless a flag says otherwise.
@@ -131,11 +134,26 @@ pub fn same_task(path: &Path, made_for: Task, task: Task) -> Result<()> {
     ))
 }
 
-/// Refuses a network whose rows are not those of the task.
+/// A network of `task` from its weights: `make` makes it of their tensors and description, `layout` says what its rows hold.
 ///
 /// # Errors
-/// [`Error::Input`] with the lengths of both.
-pub fn same_layout(path: &Path, layout: &Layout, task: Task) -> Result<()> {
+/// What reading returns; [`Error::Input`] for weights of another task, kind or layout, or that are no such network.
+pub fn read_network<N>(
+    path: &Path,
+    kind: &str,
+    task: Task,
+    make: fn(&[NamedTensor], &Value) -> std::result::Result<N, String>,
+    layout: fn(&N) -> &Layout,
+) -> Result<(N, Provenance, ContentHash)> {
+    let (tensors, description, made, content) = weights::read_hashed(path, kind)?;
+    same_task(path, made.task, task)?;
+    let network = make(&tensors, &with_layout(description)).map_err(|why| Error::input(path, why))?;
+    same_layout(path, layout(&network), task)?;
+    Ok((network, made, content))
+}
+
+/// Refuses a network whose rows are not those of the task.
+fn same_layout(path: &Path, layout: &Layout, task: Task) -> Result<()> {
     let ours = task.layout();
     if *layout == *ours {
         return Ok(());

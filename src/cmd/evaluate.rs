@@ -1,10 +1,10 @@
-use super::common::{SettingsArgs, path_or, same_layout, same_task};
+use super::common::{SettingsArgs, path_or, read_network};
 use super::places::{Content, Places, beside};
 use super::{Console, Context, Outcome, output, train};
 use crate::config::{Pipeline, Stage};
 use crate::data::differences::{Difference, differences};
 use crate::data::provenance::Provenance;
-use crate::data::{ContentHash, atomic, json_file, recording, table_file, weights};
+use crate::data::{ContentHash, atomic, json_file, recording, table_file};
 use crate::demo::Episode;
 use crate::error::{Error, Result};
 use crate::eval::{PolicyController, Rollouts, Summary, Trial, to_table};
@@ -16,7 +16,6 @@ use crate::robot::urdf;
 use crate::scene::Scene;
 use crate::seed;
 use crate::sim::{Controller, Follower};
-use crate::tasks::with_layout;
 use serde::Serialize;
 use serde_json::Value;
 use std::collections::BTreeMap;
@@ -115,11 +114,7 @@ impl Args {
 }
 
 fn read_policy(path: &Path, pipeline: &Pipeline) -> Result<(Policy, Provenance, ContentHash)> {
-    let (tensors, meta, made, content) = weights::read_hashed(path, train::KIND)?;
-    same_task(path, made.task, pipeline.task)?;
-    let policy = Policy::from_tensors(&tensors, &with_layout(meta)).map_err(|why| Error::input(path, why))?;
-    same_layout(path, policy.layout(), pipeline.task)?;
-    Ok((policy, made, content))
+    read_network(path, train::KIND, pipeline.task, Policy::from_tensors, |policy| policy.layout())
 }
 
 /// Sections of the settings that make an episode what it is.

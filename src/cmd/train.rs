@@ -1,19 +1,18 @@
 use super::checkpoint::{self, Keeper};
-use super::common::{SettingsArgs, path_or, same_layout, same_task};
+use super::common::{SettingsArgs, path_or, read_network};
 use super::epochs::Epochs;
 use super::places::{Content, beside};
 use super::{Console, Context, Outcome, pretrain};
 use crate::config::{Pipeline, Stage};
 use crate::data::{ContentHash, atomic, table_file, weights};
 use crate::env::Env;
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::eval::{PolicyController, Rollouts};
 use crate::interrupt::Interrupt;
 use crate::learn::{self, BcRl, Checkpoint, Dynamics, Hooks, Inputs, Method, MethodName, Policy, Ppo, Selection, imitator};
 use crate::scene::Scene;
 use crate::sim::{Controller, TaskEnv};
 use crate::task::Task;
-use crate::tasks::with_layout;
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -153,9 +152,6 @@ fn read_demos(dir: &Path, pipeline: &Pipeline) -> Result<(Inputs, ContentHash)> 
 }
 
 fn read_dynamics(path: &Path, task: Task) -> Result<(Dynamics, ContentHash)> {
-    let (tensors, meta, made, content) = weights::read_hashed(path, pretrain::KIND)?;
-    same_task(path, made.task, task)?;
-    let dynamics = Dynamics::from_tensors(&tensors, &with_layout(meta)).map_err(|why| Error::input(path, why))?;
-    same_layout(path, dynamics.layout(), task)?;
+    let (dynamics, _, content) = read_network(path, pretrain::KIND, task, Dynamics::from_tensors, |dynamics| dynamics.layout())?;
     Ok((dynamics, content))
 }

@@ -59,17 +59,14 @@ struct Part {
     residual2: Vec<f32>,
     d_log_std: Vec<f32>,
     sigma: Vec<f32>,
-    weight: Vec<f32>,
-    eps: Vec<f32>,
 }
 
 impl Workspace {
     /// For actions of `dim` entries, with room for batches of at most `most_rows` state-action pairs.
     pub fn new(dim: usize, most_rows: usize) -> Self {
         let part = || {
-            let zeros = || vec![0.0; dim];
-            let [residual2, d_log_std, sigma, weight, eps] = std::array::from_fn(|_| zeros());
-            let mut part = Part { residual2, d_log_std, sigma, weight, eps, ..Part::default() };
+            let [residual2, d_log_std, sigma] = std::array::from_fn(|_| vec![0.0; dim]);
+            let mut part = Part { residual2, d_log_std, sigma, ..Part::default() };
             part.noise.provide(dim, panels_of(shards::most_rows(most_rows)));
             part
         };
@@ -130,16 +127,8 @@ impl Part {
         let dim = unit.len();
         self.sigma.iter_mut().zip(&policy.log_std).for_each(|(sigma, log_std)| *sigma = exp_f32(*log_std));
         // L_BC = scale * sum over rows and entries of weight_i * (standardised error)^2
-        let scale = match choices.objective {
-            Objective::RawSum => {
-                self.weight.iter_mut().zip(unit).for_each(|(weight, unit)| *weight = unit * unit);
-                1.0 / batch.demos as f32
-            }
-            Objective::StandardisedMean => {
-                self.weight.fill(1.0);
-                1.0 / (batch.rows.len() * dim) as f32
-            }
-        };
+        let raw = choices.objective == Objective::RawSum;
+        let scale = if raw { 1.0 / batch.demos as f32 } else { 1.0 / (batch.rows.len() * dim) as f32 };
         let sampled = choices.action == ActionChoice::Sample;
         (self.loss, self.agreement) = (0.0, 0.0);
         self.residual2.fill(0.0);
@@ -154,7 +143,8 @@ impl Part {
         }
         for (p, rows) in rows.chunks(LANES).enumerate() {
             let (mut loss, mut error2) = (Lanes::default(), Lanes::default());
-            for i in 0..dim {
+            for (i, unit) in unit.iter().enumerate() {
+                let weight = if raw { unit * unit } else { 1.0 };
                 let (label, mut mean) = (&mut d_mean.panel_mut(p)[i], shard.pass.output.panel(p)[i]);
                 if rows.len() < LANES {
                     mean.take_from(rows.len(), *label); // no error where there is no row
@@ -162,8 +152,8 @@ impl Part {
                 let residual = mean - *label;
                 let shift = if sampled { self.noise.panel(p)[i] * self.sigma[i] } else { Lanes::default() };
                 let error = residual + shift;
-                let slope = error * (2.0 * scale * self.weight[i]);
-                loss += error * self.weight[i] * error;
+                let slope = error * (2.0 * scale * weight);
+                loss += error * weight * error;
                 error2 += residual * residual;
                 self.residual2[i] += (residual * residual).sum();
                 self.d_log_std[i] += (slope * shift).sum();
@@ -173,8 +163,8 @@ impl Part {
             for lane in 0..rows.len() {
                 self.agreement += match choices.convergence {
                     Convergence::SampledDensity => {
-                        self.eps.iter_mut().zip(self.noise.panel(p)).for_each(|(eps, noise)| *eps = noise.0[lane]);
-                        gaussian::sample_density(&policy.log_std, unit, &self.eps)
+                        let eps = self.noise.panel(p).iter().map(|noise| noise.0[lane]);
+                        gaussian::sample_density(&policy.log_std, unit, eps)
                     }
                     Convergence::Agreement => {
                         f64::from(exp_f32(-0.5 * error2.0[lane] / (dim as f32 * choices.tau * choices.tau)))

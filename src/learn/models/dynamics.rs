@@ -11,6 +11,7 @@ use crate::nn::{Lanes, Mlp, Pass};
 use crate::tensor::NamedTensor;
 use rand::Rng;
 use serde_json::{Value, json};
+use std::ops::{Add, Mul};
 use std::sync::Arc;
 
 /// Spread of an action below which it counts as constant \[rad/s\].
@@ -47,8 +48,6 @@ pub struct Dynamics {
     layout: Arc<Layout>,
     structure: Structure,
     known: Vec<Known>,
-    /// Duration of a control step \[s\].
-    dt_s: f32,
     features: Features,
     action: Scaling,
     residual: Scaling,
@@ -67,7 +66,6 @@ impl Dynamics {
             layout: Arc::clone(layout),
             structure: settings.structure,
             known: known(layout, settings.structure),
-            dt_s: layout.period_s as f32,
             features,
             action: Scaling::fit(corpus.rows(), action_dim, ACTION_FLOOR_RAD_S, |r, row| row.copy_from_slice(corpus.executed(r))),
             residual: Scaling { mean: vec![0.0; changing], std: vec![1.0; changing] },
@@ -105,7 +103,7 @@ impl Dynamics {
 
     /// Duration of a control step \[s\].
     pub(in crate::learn) fn dt_s(&self) -> f32 {
-        self.dt_s
+        self.layout.period_s as f32
     }
 
     /// Whether joints are known to integrate their commands.
@@ -131,11 +129,11 @@ impl Dynamics {
         given.iter_mut().enumerate().for_each(|(i, slot)| *slot = slot.map(|a| self.action.apply(i, a)));
     }
 
-    /// What entry `i` of a state is known to become before learning; `action` gives a command.
+    /// What entry `i` of a state, or of a panel of them, is known to become before learning; `action` gives a command.
     #[inline]
-    fn known_next(&self, i: usize, state: f32, action: impl Fn(usize) -> f32) -> f32 {
+    fn known_next<T: Add<Output = T> + Mul<f32, Output = T>>(&self, i: usize, state: T, action: impl Fn(usize) -> T) -> T {
         match self.known[i] {
-            Known::Integrates(k) => state + self.dt_s * action(k),
+            Known::Integrates(k) => state + action(k) * self.dt_s(),
             Known::Follows(k) => action(k),
             Known::Stays => state,
         }
@@ -152,12 +150,7 @@ impl Dynamics {
     /// The next states' changing entries from the network's output.
     pub(in crate::learn) fn write_next(&self, state: &[Lanes], action: &[Lanes], output: &[Lanes], next: &mut [Lanes]) {
         for (i, slot) in next.iter_mut().enumerate() {
-            let known = match self.known[i] {
-                Known::Integrates(k) => state[i] + action[k] * self.dt_s,
-                Known::Follows(k) => action[k],
-                Known::Stays => state[i],
-            };
-            *slot = known + output[i].map(|output| self.residual.undo(i, output));
+            *slot = self.known_next(i, state[i], |k| action[k]) + output[i].map(|output| self.residual.undo(i, output));
         }
     }
 
@@ -233,7 +226,6 @@ impl Dynamics {
         Ok(Dynamics {
             structure,
             known: known(&layout, structure),
-            dt_s: layout.period_s as f32,
             features,
             action: reader.scaling("dynamics.action", action_dim)?,
             residual: reader.scaling("dynamics.residual", changing)?,

@@ -25,8 +25,6 @@ pub struct Features {
     state: Scaling,
     derived: Scaling,
     relating: Relating,
-    /// Entries of a state that may change.
-    changing: usize,
 }
 
 /// Number of derived entries of a feature set.
@@ -48,8 +46,7 @@ impl Features {
     /// From known scalings, e.g. those of a file; their widths must be the layout's and [`derived_width`]'s.
     pub fn from_scaling(layout: &Arc<Layout>, set: FeatureSet, mask_dq: bool, state: Scaling, derived: Scaling) -> Self {
         let kept = (0..layout.state_dim()).filter(|i| !(mask_dq && layout.velocities().contains(i))).collect();
-        let (relating, changing) = (Relating::new(layout), layout.changing());
-        Features { layout: Arc::clone(layout), set, mask_dq, kept, state, derived, relating, changing }
+        Features { layout: Arc::clone(layout), set, mask_dq, kept, state, derived, relating: Relating::new(layout) }
     }
 
     /// What the rows hold.
@@ -140,7 +137,7 @@ impl Features {
     /// Adds to `d_state` the gradient that `d_inputs` sends back to the entries of the state that change during an episode;
     /// `inputs` is what [`Features::forward`] wrote.
     pub fn backward(&self, state: &[Lanes], hand: &Hand, inputs: &[Lanes], d_inputs: &[Lanes], d_state: &mut [Lanes]) {
-        for (i, d) in self.kept.iter().zip(d_inputs).take_while(|(i, _)| **i < self.changing) {
+        for (i, d) in self.kept.iter().zip(d_inputs).take_while(|(i, _)| **i < self.relating.changing) {
             d_state[*i] += *d / self.state.std[*i];
         }
         if !self.needs_hand() {

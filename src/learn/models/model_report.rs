@@ -139,10 +139,8 @@ fn advance(dynamics: &Dynamics, corpus: &Corpus, model: Model, first: usize, sta
         Model::Unchanged => {}
         Model::Integrated => {
             for (r, state) in states.chunks_exact_mut(dim).enumerate() {
-                for (i, a) in action(r).iter().enumerate().take(q.len().max(dq.len())) {
-                    q.clone().nth(i).into_iter().for_each(|q| state[q] += dynamics.dt_s() * a);
-                    dq.clone().nth(i).into_iter().for_each(|dq| state[dq] = *a);
-                }
+                q.clone().zip(action(r)).for_each(|(i, a)| state[i] += dynamics.dt_s() * a);
+                dq.clone().zip(action(r)).for_each(|(i, a)| state[i] = *a);
             }
         }
         Model::Network => {

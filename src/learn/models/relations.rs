@@ -24,7 +24,8 @@ pub struct Relating {
     /// First entry of each object that may move.
     objects: Vec<usize>,
     aims: Vec<Aim>,
-    changing: usize,
+    /// Entries of a state that may change.
+    pub changing: usize,
 }
 
 /// First entries of an object and of where it is to go, and what is added to the latter \[m\].

@@ -133,11 +133,7 @@ impl Renderer {
         });
         let mut canvas = std::mem::replace(&mut self.canvas, Samples::new(0, 0, colors::BACKGROUND));
         let solids = self.solids(&step.state.q_rad, &step.state.block, base.as_ref());
-        let mask = shadow::Mask::new(&self.pixels, self.size.0 as usize, self.size.1 as usize, &solids);
-        mask.darken(&mut canvas, SUPERSAMPLING, TAG_TABLE);
-        for (mesh, pose, rgb) in &solids {
-            canvas.draw(&self.samples, mesh, pose, Paint { rgb: *rgb, opacity: 1.0, tag: 0 });
-        }
+        draw_solids(&mut canvas, [&self.samples, &self.pixels], self.size, &solids);
         let marker = |opacity| Paint { rgb: colors::TARGET, opacity, tag: 0 };
         canvas.draw(&self.samples, &self.marker_bars, &Isometry3::identity(), marker(1.0));
         canvas.draw(&self.samples, &self.marker_faces, &Isometry3::identity(), marker(MARKER_OPACITY));
@@ -156,6 +152,20 @@ impl Renderer {
         solids.extend(base.map(|b| (&self.block, b.isometry(), colors::BASE)));
         solids.extend(self.obstacles.iter().map(|mesh| (mesh, Isometry3::identity(), colors::OBSTACLE)));
         solids
+    }
+}
+
+/// Draws what stands on the table, with its shadows: mesh, where it is, colour. The cameras are those of samples and pixels.
+fn draw_solids(
+    canvas: &mut Samples,
+    [samples, pixels]: [&Camera; 2],
+    (width, height): (u32, u32),
+    solids: &[(&Mesh, Isometry3<f64>, Rgb)],
+) {
+    let mask = shadow::Mask::new(pixels, width as usize, height as usize, solids);
+    mask.darken(canvas, SUPERSAMPLING, TAG_TABLE);
+    for (mesh, pose, rgb) in solids {
+        canvas.draw(samples, mesh, pose, Paint { rgb: *rgb, opacity: 1.0, tag: 0 });
     }
 }
 

@@ -2,8 +2,8 @@
 
 use super::camera::Camera;
 use super::mesh::Mesh;
-use super::raster::{Area, Paint, Rgb, Samples};
-use super::{RgbImage, SUPERSAMPLING, TAG_TABLE, check_size, colors, font, resolve, shadow, table};
+use super::raster::{Area, Rgb, Samples};
+use super::{RgbImage, SUPERSAMPLING, check_size, colors, draw_solids, font, resolve, table};
 use crate::error::{Error, Result};
 use crate::robot::Robot;
 use nalgebra::Isometry3;
@@ -44,10 +44,7 @@ fn picture(robot: &Robot, q: &[f64], size: (u32, u32)) -> RgbImage {
         })
         .collect();
     let solids: Vec<_> = meshes.iter().map(|(mesh, pose, rgb)| (mesh, *pose, *rgb)).collect();
-    shadow::Mask::new(&pixels, width, height, &solids).darken(&mut canvas, SUPERSAMPLING, TAG_TABLE);
-    for (mesh, pose, rgb) in &solids {
-        canvas.draw(&samples, mesh, pose, Paint { rgb: *rgb, opacity: 1.0, tag: 0 });
-    }
+    draw_solids(&mut canvas, [&samples, &pixels], size, &solids);
     let mut picture = RgbImage { width: size.0, height: size.1, data: vec![0; width * height * 3] };
     resolve(&canvas, Area::all(width, height), &mut picture);
     picture
