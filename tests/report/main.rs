@@ -116,7 +116,7 @@ fn every_form_of_a_report_is_whole_and_the_same_each_time() {
         ("table2", &["tiny-success"], &["α = d_conv (HIL)", "75.0", "119"]),
         ("table3", &["tiny-success"], &["ρ = 0.3", "failed"]),
         ("convergence", &["tiny-convergence"], &["half way at epoch"]),
-        ("training", &["tiny-epochs", "tiny-env-steps", "tiny-time"], &["Time to plateau"]),
+        ("training", &["tiny-epochs", "tiny-time"], &["Time to plateau"]),
         ("paths", &["tiny-pick-up-best"], &["I1 to G1", "steps, up to"]),
         ("ladder", &["tiny-success"], &["against"]),
         ("demos", &["tiny-demos"], &["demos"]),
