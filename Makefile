@@ -5,6 +5,8 @@ RUNS   ?= runs
 SEED   ?= 0
 # best: every documented mend; paper: as literal as can work; mended: paper with the mends that lift hil above bc.
 PRESET ?= best
+# Robot: jaco, panda, ur5e, or the TOML file of another. Another than the pipeline's has a directory of its own, RUNS/ROBOT.
+ROBOT  ?=
 PIPELINE_paper  = pipelines/paper/$(TASK).toml
 PIPELINE_mended = pipelines/mended.toml
 PIPELINE ?= $(or $(PIPELINE_$(PRESET)),pipelines/$(TASK).toml)
@@ -49,6 +51,7 @@ override SEED       := $(strip $(call typed,SEED))
 override PRESET     := $(strip $(call typed,PRESET))
 override PIPELINE   := $(call typed,PIPELINE)
 override METHOD     := $(strip $(call typed,METHOD))
+override ROBOT      := $(call typed,ROBOT)
 override RESUME     := $(strip $(call typed,RESUME))
 override CHECKPOINT := $(strip $(call typed,CHECKPOINT))
 override SET        := $(call typed,SET)
@@ -83,6 +86,7 @@ $(call number,THREADS)
 $(call number,CHECKPOINT)
 $(if $(strip $(RUNS)),,$(error RUNS is empty: it must name a directory, for example RUNS=runs))
 $(if $(call is-odd,$(RUNS))$(filter -%,$(RUNS)),$(error RUNS is "$(RUNS)": it must name a directory without blanks, without a leading - and without any of $(ODD)))
+$(if $(call is-odd,$(notdir $(ROBOT)))$(filter -%,$(ROBOT)),$(error ROBOT is "$(ROBOT)": it must name a robot or its TOML file, whose name is without blanks and without any of $(ODD)))
 $(if $(strip $(PIPELINE)),,$(error PIPELINE is empty: it must name a file with settings, for example pipelines/$(TASK).toml))
 
 # --- the run ------------------------------------------------------------------------------------------------------------------------
@@ -91,10 +95,11 @@ $(if $(strip $(PIPELINE)),,$(error PIPELINE is empty: it must name a file with s
 plain = $(if $(call is-odd,$(1)),,$(1))
 HILT := $(or $(call plain,$(CARGO_TARGET_DIR)),$(call plain,$(CARGO_BUILD_TARGET_DIR)),target)/release/hilt
 
-DIR := $(RUNS)/$(TASK)
+ROBOT_DIR := $(if $(strip $(ROBOT)),$(basename $(notdir $(ROBOT)))/)
+DIR := $(RUNS)/$(ROBOT_DIR)$(TASK)
 # What stands in the names of a method's own files.
 OF := $(patsubst %,-%,$(filter-out hil,$(METHOD)))
-FLAGS := --pipeline $(call word-of,$(PIPELINE)) --task $(TASK) --seed $(SEED) $(if $(strip $(SET)),--sets $(call word-of,$(SET)))
+FLAGS := --pipeline $(call word-of,$(PIPELINE)) --task $(TASK) $(if $(strip $(ROBOT)),--robot $(call word-of,$(ROBOT))) --seed $(SEED) $(if $(strip $(SET)),--sets $(call word-of,$(SET)))
 RUN = --threads $(THREADS) --log $(DIR)/logs/$(1).log
 SETTINGS := $(HILT) settings $(FLAGS) --threads $(THREADS)
 MADE := pipelines/made.sh $(DIR) $(METHOD)
@@ -222,7 +227,7 @@ need-cargo:
 
 # A few episodes, a few updates: every stage runs, nothing is learned.
 SMOKE := plan.episodes=12 pretrain.epochs=2 train.warm_start_updates=50 train.epochs=1 train.min_updates=0 evaluate.episodes=8
-SMOKE_DIR := $(RUNS)/smoke/$(TASK)
+SMOKE_DIR := $(RUNS)/smoke/$(ROBOT_DIR)$(TASK)
 smoke: build ## a tiny run of all stages under RUNS/smoke/TASK, in less than a minute
 	@$(MAKE) --no-print-directory all RUNS=$(RUNS)/smoke SET=$(call word-of,$(SMOKE) $(SET))
 	$(HILT) evaluate $(FLAGS) --threads $(THREADS) --policy planner --episodes 8

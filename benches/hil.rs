@@ -13,8 +13,8 @@ use hilt::interrupt::Interrupt;
 use hilt::learn::{Hil, Inputs, pretrain_dynamics};
 use hilt::math::sin_cos;
 use hilt::nn::kernel;
-use hilt::robot::READY_Q_RAD;
-use hilt::state::{CONTROL_DT_S, JOINTS};
+use hilt::robot::file::built_in::paper_robot;
+use hilt::state::CONTROL_DT_S;
 use hilt::tasks::Task;
 use std::collections::HashMap;
 use std::time::Instant;
@@ -26,9 +26,9 @@ const LEARNING_RATE: f64 = 1e-6;
 
 /// A demo of smooth joint motions; what it does is of no matter for the time.
 fn demo(index: usize) -> Demo {
-    let dim = Task::Stack.state_dim();
+    let dim = Task::Stack.layout(&paper_robot()).state_dim();
     let (mut states, mut actions) = (Vec::new(), Vec::new());
-    let mut q = READY_Q_RAD;
+    let mut q = paper_robot().ready;
     for t in 0..=STEPS {
         let wave = |i: usize| 0.3 * sin_cos((t as f64 / 20.0) + (i + index) as f64).0;
         let mut state = vec![0.0f32; dim];
@@ -43,7 +43,7 @@ fn demo(index: usize) -> Demo {
             actions.extend((0..JOINTS).map(|i| wave(i) as f32));
         }
     }
-    Demo::new(&Task::Stack.layout(), states, actions.clone(), actions).expect("lengths match")
+    Demo::new(&Task::Stack.layout(&paper_robot()), states, actions.clone(), actions).expect("lengths match")
 }
 
 fn method() -> Hil {
@@ -56,6 +56,8 @@ fn method() -> Hil {
     Hil::new(inputs, Some(dynamics), Alpha::Fixed(0.5), &settings, 0).expect("the settings are sound")
 }
 
+/// Joints of the Jaco.
+const JOINTS: usize = 9;
 /// Registers of the loops below: enough that no multiplication waits for the one before it.
 const CHAINS: usize = 12;
 const PEAK_ROUNDS: usize = 1_000_000;

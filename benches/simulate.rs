@@ -8,9 +8,10 @@ mod scripted;
 
 use hilt::config::{SceneSettings, SimulateSettings};
 use hilt::interrupt::Interrupt;
+use hilt::joints::Joints;
+use hilt::robot::file::built_in::paper_robot;
 use hilt::scene::Scene;
 use hilt::sim::{Controller, Disturbance, World, run_episode};
-use hilt::state::{ARM_JOINTS, Action};
 use hilt::tasks::{Task, draw_scene};
 use scripted::Script;
 
@@ -23,7 +24,8 @@ const SWING_RAD_S: f64 = 0.3;
 const GRIP_RAD_S: f64 = 0.3;
 
 fn stack_scene() -> Scene {
-    draw_scene(Task::Stack, &SceneSettings::default(), &mut hilt::seed::stream(0, "bench", 0)).expect("the spawn area has room")
+    draw_scene(&paper_robot(), Task::Stack, &SceneSettings::default(), &mut hilt::seed::stream(0, "bench", 0))
+        .expect("the spawn area has room")
 }
 
 /// The world with the block in the air, in the hand.
@@ -42,9 +44,9 @@ fn holding() -> World {
 fn held_block() -> Vec<f64> {
     let start = holding().snapshot();
     let restored = || World::restore(&start).expect("a snapshot made just now");
-    let action: Action = std::array::from_fn(|i| match i {
+    let action = Joints::from_fn(9, |i| match i {
         0 => SWING_RAD_S,
-        ARM_JOINTS.. => GRIP_RAD_S,
+        6.. => GRIP_RAD_S,
         _ => 0.0,
     });
     let stretch =
@@ -61,7 +63,7 @@ fn whole_episode() -> (usize, Vec<f64>) {
     let settings = SimulateSettings::default();
     let run = || {
         let mut script = Script::carry(&scene.block, scene.target_m());
-        let mut noise = Disturbance::new(&settings, hilt::seed::stream(0, "simulate", 0));
+        let mut noise = Disturbance::new(&paper_robot(), &settings, hilt::seed::stream(0, "simulate", 0));
         run_episode(0, &scene, &mut script, &mut noise, settings.max_steps, &Interrupt::default()).expect("not interrupted")
     };
     let steps = run().steps.len();

@@ -1,8 +1,9 @@
 //! Trajectories: an executed [`Episode`] with all that was recorded, and a [`Demo`], the arrays that learning reads.
 
+use crate::joints::Joints;
 use crate::layout::Layout;
 use crate::scene::Scene;
-use crate::state::{Action, FINGERS, State};
+use crate::state::{Action, State};
 use crate::task::FailureClass;
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
@@ -38,10 +39,10 @@ impl Phase {
 }
 
 /// What is known after a control step beyond the state itself.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Contacts {
     /// Normal force between each finger and the block \[N\].
-    pub finger_block_n: [f64; FINGERS],
+    pub finger_block_n: Joints,
     /// Whether the block touches the table.
     pub block_table: bool,
     /// Whether the block touches the base block.
@@ -52,6 +53,19 @@ pub struct Contacts {
     pub robot_table: bool,
 }
 
+impl Contacts {
+    /// Nothing touches anything, of a hand with so many fingers.
+    pub fn none(fingers: usize) -> Self {
+        Contacts {
+            finger_block_n: Joints::zeros(fingers),
+            block_table: false,
+            block_base: false,
+            robot_obstacle: false,
+            robot_table: false,
+        }
+    }
+}
+
 /// One control step: the state before it, the action taken in it, and what held in that state.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Step {
@@ -59,9 +73,9 @@ pub struct Step {
     pub state: State,
     /// Pose of the base block now (it may be pushed), if the task has one.
     pub base_now: Option<crate::state::Pose>,
-    /// What the controller asked for \[rad/s\].
+    /// What the controller asked for \[rad/s, m/s\].
     pub commanded: Action,
-    /// What the motors were given: commanded + noise + pulse, clamped to the joint velocity limits \[rad/s\].
+    /// What the motors were given: commanded + noise + pulse, clamped to the joint velocity limits \[rad/s, m/s\].
     pub executed: Action,
     /// Contacts in s_t.
     pub contacts: Contacts,
@@ -193,7 +207,16 @@ mod tests {
         let span = |holds, n| Span { name: "x".into(), holds, entries: vec!["x".into(); n] };
         let (d, a, t) = (5, 2, 3);
         let (state, action) = (vec![span(Holds::Numbers, d)], vec![span(Holds::Commands, a)]);
-        let layout = Layout { name: "toy".into(), period_s: 0.1, state, action, action_limits: vec![], aims: vec![], arm: None };
+        let layout = Layout {
+            name: "toy".into(),
+            period_s: 0.1,
+            state,
+            action,
+            action_limits: vec![],
+            action_units: vec![],
+            aims: vec![],
+            arm: None,
+        };
         let layout = Arc::new(layout);
         let make = |states: usize, actions: usize| Demo::new(&layout, vec![0.0; states], vec![0.0; actions], vec![0.0; actions]);
         assert_eq!(make((t + 1) * d, t * a).expect("fits").len(), t);

@@ -51,6 +51,7 @@ pub mod eval;
 pub mod experiment;
 pub mod guard;
 pub mod interrupt;
+pub mod joints;
 pub mod layout;
 pub mod learn;
 pub mod math;

@@ -1,8 +1,11 @@
 //! A scene: what stands where when an episode begins. Drawn once per episode, recorded with it.
 
+use crate::robot::Robot;
+use crate::robot::file::built_in::paper_robot;
 use crate::state::{Context, Pose};
 use crate::task::Task;
 use serde::{Deserialize, Serialize};
+use std::sync::Arc;
 
 /// Edge of every block \[m\] (paper 4.1: cubes of 5 cm).
 pub const BLOCK_EDGE_M: f64 = 0.05;
@@ -17,9 +20,12 @@ pub struct Obstacle {
     pub size_m: [f64; 3],
 }
 
-/// The scene of one episode. The table's top is the plane z = 0; the arm's base stands at the origin.
+/// The scene of one episode. The table's top is the plane z = 0; the robot's foot stands at the origin.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Scene {
+    /// Who acts. Not part of its JSON, which stands beside every plan: whoever reads that says whose plans they are.
+    #[serde(skip, default = "paper_robot")]
+    pub robot: Arc<Robot>,
     /// The task.
     pub task: Task,
     /// Where the block to move stands at the start.

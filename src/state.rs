@@ -1,33 +1,21 @@
 //! State and action of the paper: s_t and a_t, with the names and units of their columns.
 
+use crate::joints::Joints;
 use crate::math;
 use crate::task::Task;
 use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion};
 use serde::{Deserialize, Serialize};
 
-/// Joints of the arm proper (Kinova Jaco j2n6s300).
-pub const ARM_JOINTS: usize = 6;
-/// Fingers of the hand.
-pub const FINGERS: usize = 3;
-/// All driven joints: arm, then fingers.
-pub const JOINTS: usize = ARM_JOINTS + FINGERS;
-/// Entries of the state that every task has: q (9), dq (9), block pose (7).
-pub const BASE_DIM: usize = 2 * JOINTS + POSE_DIM;
-/// Most entries that a task appends: the pose of stack's base block.
-pub const MOST_CONTEXT: usize = POSE_DIM;
-/// Entries of a pose: x y z, qx qy qz qw.
-const POSE_DIM: usize = 7;
 /// Control rate \[Hz\].
 pub const CONTROL_HZ: u32 = 20;
 /// Duration of a control step \[s\].
 pub const CONTROL_DT_S: f64 = 1.0 / CONTROL_HZ as f64;
 
-/// Joint names, in the order of every 9-vector.
-pub const JOINT_NAMES: [&str; JOINTS] =
-    ["joint_1", "joint_2", "joint_3", "joint_4", "joint_5", "joint_6", "finger_1", "finger_2", "finger_3"];
+/// Entries of a pose: x y z, qx qy qz qw.
+const POSE_DIM: usize = 7;
 
-/// a_t: joint velocity command \[rad/s\], 6 arm joints then 3 fingers.
-pub type Action = [f64; JOINTS];
+/// a_t: a velocity command for each joint \[rad/s, m/s\].
+pub type Action = Joints;
 
 /// Position \[m\] and orientation (unit quaternion x y z w) of a body in the world frame.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -81,84 +69,50 @@ pub enum Context {
     Base(Pose),
 }
 
-/// s_t: what the policy sees at a control step. Vector form: q (9), dq (9), block pose (7), context (0, 3 or 7).
+/// s_t: what the policy sees at a control step. Vector form: joint positions, joint velocities, block pose (7), context (0, 3 or 7).
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct State {
-    /// Joint angles \[rad\].
-    pub q_rad: [f64; JOINTS],
-    /// Joint velocities \[rad/s\].
-    pub dq_rad_s: [f64; JOINTS],
+    /// Joint positions \[rad, m\].
+    pub q: Joints,
+    /// Joint velocities \[rad/s, m/s\].
+    pub dq: Joints,
     /// Pose of the block to move; its quaternion is sign-continuous along an episode.
     pub block: Pose,
     /// What the task adds.
     pub context: Context,
 }
 
-impl Task {
-    /// D: 25, 28 or 32.
-    pub fn state_dim(self) -> usize {
-        BASE_DIM + [0, 3, POSE_DIM][self as usize]
+impl Context {
+    /// Its numbers, in the order of a state.
+    fn values(&self) -> Vec<f64> {
+        match self {
+            Context::None => Vec::new(),
+            Context::Goal(goal) => goal.to_vec(),
+            Context::Base(base) => base.to_array().to_vec(),
+        }
     }
 }
 
 impl State {
-    /// The state as a row of `task.state_dim()` numbers (f32: the simulator's own precision).
+    /// The state as a row (f32: the simulator's own precision).
     pub fn to_row(&self) -> Vec<f32> {
-        let mut row: Vec<f32> = Vec::with_capacity(BASE_DIM + 7);
-        row.extend(self.q_rad.iter().chain(&self.dq_rad_s).map(|v| *v as f32));
-        row.extend(self.block.to_array().map(|v| v as f32));
-        match self.context {
-            Context::None => {}
-            Context::Goal(goal) => row.extend(goal.map(|v| v as f32)),
-            Context::Base(base) => row.extend(base.to_array().map(|v| v as f32)),
-        }
-        row
+        let joints = self.q.iter().chain(&self.dq).copied();
+        joints.chain(self.block.to_array()).chain(self.context.values()).map(|v| v as f32).collect()
     }
 
-    /// The inverse of [`State::to_row`]; `None` when the row's length is not `task.state_dim()`.
-    pub fn from_row(task: Task, row: &[f32]) -> Option<Self> {
-        if row.len() != task.state_dim() {
-            return None;
-        }
-        let at = |range: std::ops::Range<usize>| row[range].iter().map(|v| f64::from(*v));
-        let pose = |from: usize| {
-            let mut v = [0.0; 7];
-            at(from..from + 7).zip(&mut v).for_each(|(x, slot)| *slot = x);
-            Pose::from_array(v)
-        };
-        let (mut q_rad, mut dq_rad_s) = ([0.0; JOINTS], [0.0; JOINTS]);
-        at(0..JOINTS).zip(&mut q_rad).for_each(|(x, slot)| *slot = x);
-        at(JOINTS..2 * JOINTS).zip(&mut dq_rad_s).for_each(|(x, slot)| *slot = x);
-        let extra = |i: usize| f64::from(row[BASE_DIM + i]);
+    /// The inverse of [`State::to_row`], of a robot with so many joints; `None` when the row is not as long as the task's states.
+    pub fn from_row(task: Task, joints: usize, row: &[f32]) -> Option<Self> {
+        let row: Vec<f64> = row.iter().map(|v| f64::from(*v)).collect();
+        let (q, row) = row.split_at_checked(joints)?;
+        let (dq, row) = row.split_at_checked(joints)?;
+        let (block, extra) = row.split_first_chunk::<POSE_DIM>()?;
         let context = match task {
-            Task::PickUp => Context::None,
-            Task::PickAndPlace => Context::Goal([extra(0), extra(1), extra(2)]),
-            Task::Stack => Context::Base(pose(BASE_DIM)),
+            Task::PickUp => extra.is_empty().then_some(Context::None),
+            Task::PickAndPlace => extra.try_into().ok().map(Context::Goal),
+            Task::Stack => <[f64; POSE_DIM]>::try_from(extra).ok().map(|pose| Context::Base(Pose::from_array(pose))),
         };
-        Some(State { q_rad, dq_rad_s, block: pose(2 * JOINTS), context })
+        Some(State { q: Joints::of(q)?, dq: Joints::of(dq)?, block: Pose::from_array(*block), context: context? })
     }
-
-    /// Column names with units of the vector form, e.g. `joint_1.q_rad`, `block.x_m`, `goal.x_m`.
-    pub fn column_names(task: Task) -> Vec<String> {
-        let mut names: Vec<String> = JOINT_NAMES.iter().map(|j| format!("{j}.q_rad")).collect();
-        names.extend(JOINT_NAMES.iter().map(|j| format!("{j}.dq_rad_s")));
-        names.extend(pose_names("block"));
-        match task {
-            Task::PickUp => {}
-            Task::PickAndPlace => names.extend(["goal.x_m", "goal.y_m", "goal.z_m"].map(String::from)),
-            Task::Stack => names.extend(pose_names("base")),
-        }
-        names
-    }
-}
-
-fn pose_names(body: &str) -> impl Iterator<Item = String> + '_ {
-    ["x_m", "y_m", "z_m", "qx", "qy", "qz", "qw"].into_iter().map(move |c| format!("{body}.{c}"))
-}
-
-/// Column names with units of an action.
-pub fn action_names() -> Vec<String> {
-    JOINT_NAMES.iter().map(|j| format!("{j}.velocity_rad_s")).collect()
 }
 
 #[cfg(test)]
@@ -166,13 +120,14 @@ mod tests {
     use super::*;
 
     #[test]
-    fn row_round_trips_and_names_match_the_dimension() {
-        for task in Task::ALL {
-            let row: Vec<f32> = (0..task.state_dim()).map(|i| i as f32 * 0.25).collect();
-            let state = State::from_row(task, &row).expect("row has the task's length");
+    fn a_row_round_trips_for_any_number_of_joints() {
+        for (task, joints, dim) in
+            [(Task::PickUp, 9, 25), (Task::PickAndPlace, 9, 28), (Task::Stack, 7, 28), (Task::Stack, 9, 32)]
+        {
+            let row: Vec<f32> = (0..dim).map(|i| i as f32 * 0.25).collect();
+            let state = State::from_row(task, joints, &row).expect("row has the task's length");
             assert_eq!(state.to_row(), row);
-            assert_eq!(State::column_names(task).len(), task.state_dim());
-            assert!(State::from_row(task, &row[1..]).is_none());
+            assert!(State::from_row(task, joints, &row[1..]).is_none());
         }
     }
 }

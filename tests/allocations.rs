@@ -4,6 +4,7 @@ use hilt::config::{ActionChoice, Alpha, PretrainSettings, TrainSettings};
 use hilt::demo::Demo;
 use hilt::interrupt::Interrupt;
 use hilt::learn::{Hil, Inputs, pretrain_dynamics};
+use hilt::robot::file::built_in::paper_robot;
 use hilt::tasks::Task;
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
@@ -56,11 +57,12 @@ const BATCH: usize = 4;
 
 /// A demo of 40 steps and more; what it does is of no matter here.
 fn demo(index: usize) -> Demo {
-    let (dim, steps) = (Task::PickUp.state_dim(), 40 + 7 * index);
+    let layout = Task::PickUp.layout(&paper_robot());
+    let (dim, steps) = (layout.state_dim(), 40 + 7 * index);
     let value = |i: usize| (((i + index) * 37 % 101) as f32 - 50.0) / 100.0;
     let states = (0..(steps + 1) * dim).map(value).collect();
     let actions: Vec<f32> = (0..steps * 9).map(value).collect();
-    Demo::new(&Task::PickUp.layout(), states, actions.clone(), actions).expect("lengths match")
+    Demo::new(&layout, states, actions.clone(), actions).expect("lengths match")
 }
 
 /// One update of Algorithm 1 on four demos that depend on `i`.

@@ -4,10 +4,8 @@ use hilt::config::{Pipeline, SimulateSettings, Source};
 use hilt::demo::{Episode, Phase};
 use hilt::interrupt::Interrupt;
 use hilt::plan::Planner;
-use hilt::robot::VELOCITY_LIMITS_RAD_S;
 use hilt::seed::stream;
 use hilt::sim::{Disturbance, Follower, run_episode};
-use hilt::state::ARM_JOINTS;
 use hilt::tasks::{Task, draw_scene};
 use std::path::Path;
 
@@ -15,10 +13,13 @@ use std::path::Path;
 const EPISODES: u64 = 8;
 
 fn demonstrate(pipeline: &Pipeline, settings: &SimulateSettings, index: u64) -> Episode {
-    let scene = draw_scene(pipeline.task, &pipeline.scene, &mut stream(0, "demonstrator.scene", index)).expect("there is room");
-    let plan = Planner::new(&pipeline.plan).plan(index, &scene, &mut stream(0, "demonstrator.search", index)).expect("a plan");
+    let scene = draw_scene(&pipeline.robot, pipeline.task, &pipeline.scene, &mut stream(0, "demonstrator.scene", index))
+        .expect("there is room");
+    let plan = Planner::new(&pipeline.robot, &pipeline.plan)
+        .plan(index, &scene, &mut stream(0, "demonstrator.search", index))
+        .expect("a plan");
     let mut follower = Follower::new(&plan).expect("the plan has every phase");
-    let mut disturbance = Disturbance::new(settings, stream(0, "demonstrator.noise", index));
+    let mut disturbance = Disturbance::new(&pipeline.robot, settings, stream(0, "demonstrator.noise", index));
     run_episode(index, &scene, &mut follower, &mut disturbance, settings.max_steps, &Interrupt::default())
         .expect("not interrupted")
 }
@@ -38,7 +39,10 @@ fn every_task_is_solved_under_noise_without_a_needless_wait() {
             assert!(phases.is_sorted(), "{task} {index} went back: {phases:?}");
             for (t, step) in episode.steps.iter().enumerate() {
                 for (j, command) in step.commanded.iter().enumerate() {
-                    assert!(command.abs() <= VELOCITY_LIMITS_RAD_S[j] + 1e-6, "{task} {index}, step {t}, joint {j}: {command}");
+                    assert!(
+                        command.abs() <= episode.scene.robot.joints[j].velocity + 1e-6,
+                        "{task} {index}, step {t}, joint {j}: {command}"
+                    );
                 }
             }
         }
@@ -67,8 +71,8 @@ fn a_pushed_arm_is_commanded_back_to_the_plan() {
         let steps = demonstrate(&pipeline, &settings, index).steps;
         for pair in steps.windows(2).filter(|w| w.iter().all(|s| s.phase == Some(Phase::Approach))) {
             let push = |j: usize| pair[0].executed[j] - pair[0].commanded[j];
-            pushed += usize::from((0..ARM_JOINTS).any(|j| push(j) != 0.0));
-            lean += (0..ARM_JOINTS).map(|j| push(j) * (pair[1].commanded[j] - pair[0].commanded[j])).sum::<f64>();
+            pushed += usize::from((0..pipeline.robot.arm).any(|j| push(j) != 0.0));
+            lean += (0..pipeline.robot.arm).map(|j| push(j) * (pair[1].commanded[j] - pair[0].commanded[j])).sum::<f64>();
         }
     }
     assert!(pushed > 0, "no push in any approach: nothing was tested");

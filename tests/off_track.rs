@@ -34,7 +34,8 @@ fn each_changes_what_its_name_says_and_has_room() {
         assert_eq!(changed, changes, "{name}");
         assert_eq!(lines.len(), ordinary.len(), "{name}");
         for index in 0..50 {
-            draw_scene(Task::Stack, &pipeline.scene, &mut stream(0, "off-track test", index)).expect("there is room");
+            draw_scene(&pipeline.robot, Task::Stack, &pipeline.scene, &mut stream(0, "off-track test", index))
+                .expect("there is room");
         }
     }
 }

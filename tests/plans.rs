@@ -5,15 +5,16 @@ mod plan_oracle;
 use hilt::config::{PlanSettings, SceneSettings};
 use hilt::demo::Phase;
 use hilt::interrupt::Interrupt;
+use hilt::joints::Joints;
 use hilt::math::{acos, cos};
 use hilt::plan::{
     CLEARANCE_M, GRASP_OVER_CENTER_M, LIFTED_CENTER_M, Limits, Plan, PlanError, Planner, Plans, RELEASE_GAP_M, check_ready_pose,
     from_table, to_table,
 };
-use hilt::robot::{Arm, POSITION_LIMITS_RAD, READY_Q_RAD};
+use hilt::robot::file::built_in::paper_robot;
 use hilt::scene::{Obstacle, Scene};
 use hilt::seed::stream;
-use hilt::state::{CONTROL_DT_S, Context, JOINTS, Pose};
+use hilt::state::{CONTROL_DT_S, Context, Pose};
 use hilt::table::Values;
 use hilt::tasks::{REST_HEIGHT_M, Task, draw_scene};
 use plan_oracle::Oracle;
@@ -28,7 +29,7 @@ const ROUNDING: f64 = 1e-9;
 
 fn scene(task: Task, index: u64) -> Scene {
     let settings = SceneSettings { yaw: index % 2 == 1, ..SceneSettings::default() };
-    draw_scene(task, &settings, &mut stream(1, "scene", index)).expect("the default area has room")
+    draw_scene(&paper_robot(), task, &settings, &mut stream(1, "scene", index)).expect("the default area has room")
 }
 
 /// A pick-and-place from one side of a thin wall to the other. Nearer than 6.3 cm to its middle the palm of a level hand cannot go down.
@@ -38,7 +39,15 @@ fn over_the_wall(index: u64, height_m: f64) -> Scene {
     let block = Pose::from_yaw([within(0.35, 0.60), within(-0.15, -0.065), REST_HEIGHT_M], 0.0);
     let goal = Context::Goal([within(0.35, 0.60), within(0.065, 0.15), REST_HEIGHT_M]);
     let wall = Obstacle { center_m: [0.475, 0.0, height_m / 2.0], size_m: [0.35, 0.02, height_m] };
-    Scene { task: Task::PickAndPlace, block, context: goal, obstacles: vec![wall], friction: 1.0, block_mass_kg: 0.1 }
+    Scene {
+        robot: paper_robot(),
+        task: Task::PickAndPlace,
+        block,
+        context: goal,
+        obstacles: vec![wall],
+        friction: 1.0,
+        block_mass_kg: 0.1,
+    }
 }
 
 fn plan(planner: &mut Planner, scene: &Scene, index: u64) -> Result<Plan, PlanError> {
@@ -48,13 +57,13 @@ fn plan(planner: &mut Planner, scene: &Scene, index: u64) -> Result<Plan, PlanEr
 #[test]
 fn a_thousand_random_plans_hold_every_limit_and_touch_nothing() {
     let settings = PlanSettings::default();
-    let mut planner = Planner::new(&settings);
+    let mut planner = Planner::new(&paper_robot(), &settings);
     for index in 0..1000 {
         let task = Task::ALL[index as usize % 3];
         let scene = scene(task, index);
         let plan = plan(&mut planner, &scene, index).unwrap_or_else(|e| panic!("{task} {index}: {e}"));
         check_phases(&plan);
-        check_limits(&plan, &Limits::new(&settings));
+        check_limits(&plan, &Limits::new(&paper_robot(), &settings));
         check_hand(&plan);
         Oracle::new(&scene).check(&plan, CLEARANCE_M);
     }
@@ -65,26 +74,26 @@ fn check_phases(plan: &Plan) {
     let mut phases: Vec<Phase> = plan.waypoints.iter().map(|w| w.phase).collect();
     phases.dedup();
     assert_eq!(phases, expected);
-    assert_eq!(plan.waypoints[0].q_rad, READY_Q_RAD);
+    assert_eq!(plan.waypoints[0].q, paper_robot().ready);
     assert!(plan.waypoints.len() < 240, "{} steps", plan.waypoints.len());
 }
 
 fn check_limits(plan: &Plan, limits: &Limits) {
     let w = &plan.waypoints;
     let rest = [w[0]].into_iter().chain(w.iter().copied()).chain([w[w.len() - 1]]).collect::<Vec<_>>();
-    for (j, [low, high]) in POSITION_LIMITS_RAD.into_iter().enumerate() {
-        let (v, a) = (limits.velocity_rad_s[j] + ROUNDING, limits.acceleration_rad_s2[j] + ROUNDING);
+    for (j, [low, high]) in limits.position.iter().copied().enumerate() {
+        let (v, a) = (limits.velocity[j] + ROUNDING, limits.acceleration[j] + ROUNDING);
         for around in rest.windows(3) {
-            let [before, now, after] = [around[0].q_rad[j], around[1].q_rad[j], around[2].q_rad[j]];
+            let [before, now, after] = [around[0].q[j], around[1].q[j], around[2].q[j]];
             assert!((low..=high).contains(&now), "joint {j} at {now}");
             assert!((after - now).abs() / CONTROL_DT_S <= v, "joint {j} moves at {} rad/s", (after - now) / CONTROL_DT_S);
             let bend = (after - 2.0 * now + before) / CONTROL_DT_S.powi(2);
             assert!(bend.abs() <= a, "joint {j} accelerates at {bend} rad/s^2");
-            assert!(around[1].dq_rad_s[j].abs() <= v);
-            let change = around[2].dq_rad_s[j] - around[1].dq_rad_s[j];
+            assert!(around[1].dq[j].abs() <= v);
+            let change = around[2].dq[j] - around[1].dq[j];
             assert!(change.abs() / CONTROL_DT_S <= a, "joint {j}'s velocity changes by {change} rad/s in a step");
             if around[1].phase == around[2].phase {
-                assert!((around[1].dq_rad_s[j] - (after - now) / CONTROL_DT_S).abs() < ROUNDING);
+                assert!((around[1].dq[j] - (after - now) / CONTROL_DT_S).abs() < ROUNDING);
             }
         }
     }
@@ -92,11 +101,11 @@ fn check_limits(plan: &Plan, limits: &Limits) {
 
 /// The hand is level all the way, grasps the block's centre, and lets it go over the target.
 fn check_hand(plan: &Plan) {
-    let arm = Arm::new();
+    let arm = paper_robot();
     let end_of =
-        |phase: Phase| plan.waypoints.iter().rev().find(|w| w.phase == phase).map(|w| arm.tool_pose(&w.q_rad).translation.vector);
+        |phase: Phase| plan.waypoints.iter().rev().find(|w| w.phase == phase).map(|w| arm.tool_pose(&w.q).translation.vector);
     for w in &plan.waypoints {
-        let up = arm.tool_pose(&w.q_rad).rotation * nalgebra::Vector3::z();
+        let up = arm.tool_pose(&w.q).rotation * nalgebra::Vector3::z();
         assert!(up.z > cos(LEVEL_RAD), "hand tilted by {} rad in {}", acos(up.z), w.phase.name());
     }
     let near = |at: nalgebra::Vector3<f64>, [x, y, z]: [f64; 3]| {
@@ -114,13 +123,13 @@ fn check_hand(plan: &Plan) {
 
 #[test]
 fn a_wall_between_spawn_and_goal_is_passed_without_touching_it() {
-    let mut planner = Planner::new(&PlanSettings::default());
+    let mut planner = Planner::new(&paper_robot(), &PlanSettings::default());
     let (mut planned, mut failures) = (0, Vec::new());
     for index in 0..100 {
         let scene = over_the_wall(index, 0.12 + 0.03 * (index % 2) as f64);
         match plan(&mut planner, &scene, index) {
             Ok(plan) => {
-                check_limits(&plan, &Limits::new(&PlanSettings::default()));
+                check_limits(&plan, &Limits::new(&paper_robot(), &PlanSettings::default()));
                 Oracle::new(&scene).check(&plan, CLEARANCE_M);
                 planned += 1;
             }
@@ -132,7 +141,7 @@ fn a_wall_between_spawn_and_goal_is_passed_without_touching_it() {
 
 #[test]
 fn a_post_too_high_to_pass_over_is_searched_around() {
-    let mut planner = Planner::new(&PlanSettings::default());
+    let mut planner = Planner::new(&paper_robot(), &PlanSettings::default());
     let post = Obstacle { center_m: [0.62, 0.0, 0.35], size_m: [0.06, 0.04, 0.70] };
     let block = Pose::from_yaw([0.56, -0.15, REST_HEIGHT_M], 0.0);
     for index in 0..10 {
@@ -146,23 +155,27 @@ fn a_post_too_high_to_pass_over_is_searched_around() {
             found.waypoints.len() > plan(&mut planner, &straight, index).unwrap().waypoints.len(),
             "the post was not in the way"
         );
-        assert_eq!(found, plan(&mut Planner::new(&PlanSettings::default()), &scene, index).unwrap(), "a search repeats itself");
+        assert_eq!(
+            found,
+            plan(&mut Planner::new(&paper_robot(), &PlanSettings::default()), &scene, index).unwrap(),
+            "a search repeats itself"
+        );
     }
 }
 
 #[test]
 fn earlier_plans_leave_no_trace() {
-    let mut used = Planner::new(&PlanSettings::default());
+    let mut used = Planner::new(&paper_robot(), &PlanSettings::default());
     for index in [5, 11, 4, 3] {
         let scene = scene(Task::ALL[index as usize % 3], index);
-        let fresh = plan(&mut Planner::new(&PlanSettings::default()), &scene, index);
+        let fresh = plan(&mut Planner::new(&paper_robot(), &PlanSettings::default()), &scene, index);
         assert_eq!(plan(&mut used, &scene, index), fresh);
     }
 }
 
 #[test]
 fn what_cannot_be_planned_is_named() {
-    let mut planner = Planner::new(&PlanSettings::default());
+    let mut planner = Planner::new(&paper_robot(), &PlanSettings::default());
     let mut far = scene(Task::PickUp, 0);
     far.block.position_m[0] = 1.2;
     let error = plan(&mut planner, &far, 0).unwrap_err();
@@ -182,17 +195,17 @@ fn neighbouring_blocks_are_grasped_by_neighbouring_postures() {
     // block at y = 0.27 m the hand had to turn for some blocks beside it.
     const STEP_M: f64 = 0.02;
     const NEIGHBOUR_RAD: f64 = 0.2;
-    let mut planner = Planner::new(&PlanSettings::default());
+    let mut planner = Planner::new(&paper_robot(), &PlanSettings::default());
     for task in Task::ALL {
         let mut grasp = |i: i32, k: i32| {
             let settings = SceneSettings { goal_x_m: [0.47, 0.47], goal_y_m: [0.0, 0.0], ..SceneSettings::default() };
-            let mut scene = draw_scene(task, &settings, &mut stream(0, "plan.scene", 0)).unwrap();
+            let mut scene = draw_scene(&paper_robot(), task, &settings, &mut stream(0, "plan.scene", 0)).unwrap();
             scene.block = Pose::from_yaw([0.32 + STEP_M * f64::from(i), -0.15 + STEP_M * f64::from(k), REST_HEIGHT_M], 0.0);
             let plan = plan(&mut planner, &scene, 0).unwrap();
-            plan.waypoints.iter().rev().find(|w| w.phase == Phase::Approach).unwrap().q_rad
+            plan.waypoints.iter().rev().find(|w| w.phase == Phase::Approach).unwrap().q
         };
-        let grid: Vec<Vec<[f64; JOINTS]>> = (0..=15).map(|i| (0..=15).map(|k| grasp(i, k)).collect()).collect();
-        let apart = |a: &[f64; JOINTS], b: &[f64; JOINTS]| a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+        let grid: Vec<Vec<Joints>> = (0..=15).map(|i| (0..=15).map(|k| grasp(i, k)).collect()).collect();
+        let apart = |a: &Joints, b: &Joints| a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
         for (i, row) in grid.iter().enumerate() {
             for (k, here) in row.iter().enumerate() {
                 let before = [i.checked_sub(1).map(|i| &grid[i][k]), k.checked_sub(1).map(|k| &row[k])];
@@ -206,11 +219,11 @@ fn neighbouring_blocks_are_grasped_by_neighbouring_postures() {
 
 #[test]
 fn tables_hold_plans_exactly_and_refuse_what_is_none() {
-    let mut planner = Planner::new(&PlanSettings::default());
+    let mut planner = Planner::new(&paper_robot(), &PlanSettings::default());
     let mut plans: Vec<Plan> = (0..4).map(|i| plan(&mut planner, &scene(Task::ALL[i as usize % 3], i), i).unwrap()).collect();
     plans[1].scene.obstacles = over_the_wall(0, 0.123_456_789).obstacles;
-    let table = to_table(&plans);
-    assert_eq!(from_table(&table).unwrap(), plans);
+    let table = to_table(&paper_robot(), &plans);
+    assert_eq!(from_table(&paper_robot(), &table).unwrap(), plans);
 
     // In pieces that end anywhere.
     for size in [1, 7, 100, table.rows()] {
@@ -228,14 +241,14 @@ fn tables_hold_plans_exactly_and_refuse_what_is_none() {
             Ok(piece)
         };
         let pieces = (0..table.rows()).step_by(size).map(piece);
-        let found: Vec<Plan> = Plans::new(Path::new("plans"), pieces).collect::<Result<_, _>>().unwrap();
+        let found: Vec<Plan> = Plans::new(Path::new("plans"), &paper_robot(), pieces).collect::<Result<_, _>>().unwrap();
         assert_eq!(found, plans, "in pieces of {size} rows");
     }
 
     let with = |name: &str, change: fn(&mut Values)| {
         let mut table = table.clone();
         change(&mut table.columns.iter_mut().find(|c| c.name == name).unwrap().values);
-        from_table(&table).unwrap_err()
+        from_table(&paper_robot(), &table).unwrap_err()
     };
     let nan = with("joint_2.q_rad", |v| {
         if let Values::F64(v) = v {
@@ -263,7 +276,7 @@ fn tables_hold_plans_exactly_and_refuse_what_is_none() {
     assert!(mixed.contains("row 1"), "{mixed}");
     let mut missing = table.clone();
     missing.columns.retain(|c| c.name != "finger_3.dq_rad_s");
-    assert!(from_table(&missing).unwrap_err().contains("finger_3.dq_rad_s"));
+    assert!(from_table(&paper_robot(), &missing).unwrap_err().contains("finger_3.dq_rad_s"));
 }
 
 /// A wall too high to pass over or around: the search would go on for minutes.
@@ -271,7 +284,7 @@ fn tables_hold_plans_exactly_and_refuse_what_is_none() {
 fn an_interrupt_ends_a_search_within_a_second() {
     let interrupt = Interrupt::default();
     let settings = PlanSettings { search_iterations: 100_000, shortcut_iterations: 100_000, ..PlanSettings::default() };
-    let mut planner = Planner::new(&settings).with_interrupt(&interrupt);
+    let mut planner = Planner::new(&paper_robot(), &settings).with_interrupt(&interrupt);
     let mut scene = over_the_wall(0, 2.0);
     scene.obstacles[0].size_m[0] = 1.4;
     scene.obstacles[0].center_m[0] = 0.9;
@@ -290,7 +303,8 @@ fn an_interrupt_ends_a_search_within_a_second() {
 #[test]
 fn a_plan_that_nothing_could_execute_is_given_up() {
     for (speed, max_acceleration_rad_s2) in [(1e-5, 3.0), (0.8, 1e-300), (1e-300, 1e-300), (1e-3, 3.0)] {
-        let mut planner = Planner::new(&PlanSettings { speed, max_acceleration_rad_s2, ..PlanSettings::default() });
+        let mut planner =
+            Planner::new(&paper_robot(), &PlanSettings { speed, max_acceleration_rad_s2, ..PlanSettings::default() });
         let why = plan(&mut planner, &scene(Task::Stack, 0), 0).expect_err("too long").to_string();
         assert!(why.contains("simulate.max_steps can allow no more than 10000") && why.contains("raise plan.speed"), "{why}");
     }
@@ -300,7 +314,10 @@ fn a_plan_that_nothing_could_execute_is_given_up() {
 #[test]
 fn a_box_that_touches_the_arm_where_it_begins_is_refused_and_one_beside_it_is_not() {
     let with = |center_m, size_m| {
-        check_ready_pose(&SceneSettings { obstacles: vec![Obstacle { center_m, size_m }], ..SceneSettings::default() })
+        check_ready_pose(
+            &paper_robot(),
+            &SceneSettings { obstacles: vec![Obstacle { center_m, size_m }], ..SceneSettings::default() },
+        )
     };
     for (center, size, link) in [
         ([0.0, 0.0, 0.3], [0.02; 3], "link_1"),

@@ -2,8 +2,9 @@
 
 use hilt::demo::{Contacts, Episode, Phase, Step};
 use hilt::interrupt::Interrupt;
+use hilt::joints::Joints;
 use hilt::report::render::{GifOptions, RgbImage, frame, write_gif, write_png_sheet};
-use hilt::robot::{Arm, READY_Q_RAD};
+use hilt::robot::file::built_in::paper_robot;
 use hilt::scene::{Obstacle, Scene};
 use hilt::state::{Context, Pose, State};
 use hilt::tasks::Task;
@@ -11,14 +12,14 @@ use hilt::tasks::Task;
 const SIZE: (u32, u32) = (480, 360);
 
 /// Tool path from the ready pose down to the block and up again, found by steps along the Jacobian.
-fn reach(mut q: [f64; 9], target: [f64; 3]) -> [f64; 9] {
-    let arm = Arm::new();
+fn reach(mut q: Joints, target: [f64; 3]) -> Joints {
+    let arm = paper_robot();
     for _ in 0..200 {
         let (tool, jacobian) = arm.tool_jacobian(&q);
         let turn = -tool.rotation.scaled_axis();
         let gap = nalgebra::Vector3::from(target) - tool.translation.vector;
         let wanted = nalgebra::Vector6::new(gap.x, gap.y, gap.z, turn.x, turn.y, turn.z);
-        let damped = jacobian * jacobian.transpose() + nalgebra::Matrix6::identity() * 1e-4;
+        let damped: nalgebra::Matrix6<f64> = &jacobian * jacobian.transpose() + nalgebra::Matrix6::identity() * 1e-4;
         let dq = jacobian.transpose() * damped.try_inverse().unwrap() * wanted;
         (0..6).for_each(|i| q[i] += 0.5 * dq[i]);
     }
@@ -36,26 +37,26 @@ fn episode(task: Task, steps: usize) -> Episode {
         Task::PickAndPlace => vec![Obstacle { center_m: [0.62, 0.22, 0.06], size_m: [0.06, 0.10, 0.12] }],
         _ => Vec::new(),
     };
-    let scene = Scene { task, block, context, obstacles, friction: 1.0, block_mass_kg: 0.1 };
-    let above = reach(READY_Q_RAD, [0.50, -0.06, 0.03]);
+    let scene = Scene { robot: paper_robot(), task, block, context, obstacles, friction: 1.0, block_mass_kg: 0.1 };
+    let above = reach(paper_robot().ready, [0.50, -0.06, 0.03]);
     let target = scene.target_m();
     let end = reach(above, target);
-    let mix = |a: [f64; 9], b: [f64; 9], s: f64| std::array::from_fn(|i| a[i] + (b[i] - a[i]) * s);
+    let mix = |a: Joints, b: Joints, s: f64| Joints::from_fn(9, |i| a[i] + (b[i] - a[i]) * s);
     let step = |t: usize| {
         let share = 2.0 * t as f64 / steps as f64;
         let (mut q, block) = if share < 1.0 {
-            (mix(READY_Q_RAD, above, share), block)
+            (mix(paper_robot().ready, above, share), block)
         } else {
             let q = mix(above, end, share - 1.0);
-            (q, Pose::from_isometry(&Arm::new().tool_pose(&q)))
+            (q, Pose::from_isometry(&paper_robot().tool_pose(&q)))
         };
         q[6..].fill(0.4 + 0.5 * share.min(1.0));
         Step {
-            state: State { q_rad: q, dq_rad_s: [0.0; 9], block, context },
+            state: State { q, dq: Joints::zeros(9), block, context },
             base_now: None,
-            commanded: [0.0; 9],
-            executed: [0.0; 9],
-            contacts: Contacts::default(),
+            commanded: Joints::zeros(9),
+            executed: Joints::zeros(9),
+            contacts: Contacts::none(3),
             block_speed_m_s: 0.0,
             reward: 0.0,
             conditions: Vec::new(),

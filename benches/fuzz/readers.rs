@@ -8,6 +8,7 @@ use hilt::error::{Error, Result};
 use hilt::interrupt::Interrupt;
 use hilt::learn::{Checkpoint, Dynamics, Policy};
 use hilt::plan::{Plans, from_table};
+use hilt::robot::file::built_in::paper_robot;
 use hilt::seed::stream;
 use hilt::table::Table;
 use hilt::tensor::NamedTensor;
@@ -210,9 +211,9 @@ impl Reader {
         match self.name {
             "recording" => recording::read(path)?.0.to_demo().map(drop).map_err(misfit),
             "plans" => {
-                let whole = table_file::read(path).and_then(|(table, _)| from_table(&table).map_err(misfit));
+                let whole = table_file::read(path).and_then(|(table, _)| from_table(&paper_robot(), &table).map_err(misfit));
                 let plans = table_file::Reader::open(path)?;
-                let in_pieces = Plans::new(path, plans.tables()?).collect::<Result<Vec<_>>>();
+                let in_pieces = Plans::new(path, &paper_robot(), plans.tables()?).collect::<Result<Vec<_>>>();
                 if let (Ok(whole), Ok(in_pieces)) = (&whole, &in_pieces) {
                     assert!(whole == in_pieces, "other plans when read in pieces");
                 }

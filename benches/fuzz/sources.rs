@@ -7,7 +7,7 @@ use hilt::demo::Demo;
 use hilt::interrupt::Interrupt;
 use hilt::learn::{Checkpoint, Dynamics, Hooks, Inputs, MethodName, pretrain_dynamics, train};
 use hilt::plan::{Plan, from_table, to_table};
-use hilt::state::JOINTS;
+use hilt::robot::file::built_in::paper_robot;
 use serde_json::json;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
@@ -28,13 +28,13 @@ fn provenance(stage: &str) -> Provenance {
 pub fn recording() -> Vec<u8> {
     let (mut episode, made) = recording::read(&fixture("recordings/episode-00000.mcap")).expect("a fixture");
     episode.steps.truncate(STEPS);
-    recording::encode(Path::new("episode"), &episode, "<robot/>", &made).expect("an episode")
+    recording::encode(Path::new("episode"), &episode, &made).expect("an episode")
 }
 
 /// Plans of a few waypoints each.
 pub fn plans() -> Vec<Plan> {
     let (table, _) = table_file::read(&fixture("plans.parquet")).expect("a fixture");
-    let mut plans = from_table(&table).expect("plans");
+    let mut plans = from_table(&paper_robot(), &table).expect("plans");
     plans.iter_mut().for_each(|plan| plan.waypoints.truncate(STEPS));
     plans
 }
@@ -46,15 +46,16 @@ pub fn table(table: &hilt::table::Table) -> Option<Vec<u8>> {
 
 /// The table of [`plans`].
 pub fn plan_table() -> hilt::table::Table {
-    to_table(&plans())
+    to_table(&paper_robot(), &plans())
 }
 
 /// A demo of a few steps.
 pub fn demo() -> Demo {
     let found = dataset::read(&fixture("dataset/validation")).expect("a fixture");
-    let (demo, dim) = (&found.demos[0], found.task.state_dim());
+    let (demo, dim) = (&found.demos[0], found.layout.state_dim());
     let cut = |rows: &[f32], width: usize, count: usize| rows[..width * count].to_vec();
-    let (actions, executed) = (cut(demo.actions(), JOINTS, STEPS), cut(demo.executed(), JOINTS, STEPS));
+    let (actions, executed) =
+        (cut(demo.actions(), found.layout.action_dim(), STEPS), cut(demo.executed(), found.layout.action_dim(), STEPS));
     Demo::new(demo.layout(), cut(demo.states(), dim, STEPS + 1), actions, executed).expect("a demo")
 }
 
@@ -63,7 +64,7 @@ pub fn dataset(root: &Path) {
     let demo = demo();
     let of = |source_index| DatasetEpisode { source_index, demo: demo.clone(), rewards: vec![0.5; STEPS], success: true };
     let task = demo.layout().name.parse().expect("a task's demo");
-    dataset::write(root, task, &[of(0), of(1)].as_slice().into(), &provenance("convert")).expect("a dataset");
+    dataset::write(root, (&paper_robot(), task), &[of(0), of(1)].as_slice().into(), &provenance("convert")).expect("a dataset");
 }
 
 /// A dynamics network of a few units.

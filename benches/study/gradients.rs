@@ -8,11 +8,14 @@ use hilt::demo::{Episode, Phase};
 use hilt::learn::Dynamics;
 use hilt::report::table::text_table;
 use hilt::sim::World;
-use hilt::state::{ARM_JOINTS, Action, JOINTS};
+use hilt::state::Action;
 use hilt::tasks::with_layout;
 use std::ops::Range;
 use std::path::Path;
 
+/// Joints of the Jaco, and of its arm.
+const JOINTS: usize = 9;
+const ARM_JOINTS: usize = 6;
 /// Steps from the action to the state that answers.
 const STEPS: usize = 3;
 /// Change of the action \[rad/s\]: the noise of the demos, large enough to move a finger against its friction.
@@ -95,7 +98,7 @@ fn answer(joint: usize, executed: &Action, state_after: impl Fn(&Action) -> Resu
 
 /// The state after `action` and the recorded actions that follow, by the network.
 fn predicted(dynamics: &Dynamics, episode: &Episode, t: usize, action: &Action) -> Vec<f64> {
-    let single = |action: &Action| action.map(|v| v as f32);
+    let single = |action: &Action| action.iter().map(|v| *v as f32).collect::<Vec<f32>>();
     let mut state = dynamics.predict(&episode.steps[t].state.to_row(), &single(action));
     for step in &episode.steps[t + 1..t + STEPS] {
         state = dynamics.predict(&state, &single(&step.executed));

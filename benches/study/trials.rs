@@ -5,14 +5,15 @@
 mod scripted;
 
 use hilt::config::{PlanSettings, SceneSettings, SimulateSettings};
+use hilt::joints::Joints;
 use hilt::math::sin_cos;
 use hilt::plan::{Plan, Planner};
-use hilt::robot::jaco::HAND_LINK;
-use hilt::robot::{Arm, LINK_SHAPES, Shape};
+use hilt::robot::Robot;
+use hilt::robot::file::built_in::paper_robot;
 use hilt::scene::{BLOCK_EDGE_M, Scene};
 use hilt::seed::stream;
 use hilt::sim::{Controller, Disturbance, Follower, Physics, World};
-use hilt::state::{ARM_JOINTS, CONTROL_DT_S, CONTROL_HZ, Context, JOINTS, Pose};
+use hilt::state::{CONTROL_DT_S, CONTROL_HZ, Context, Pose};
 use hilt::tasks::{FailureClass, Monitor, Observation, Task, draw_scene};
 use nalgebra::{Point3, Vector3};
 use scripted::Script;
@@ -21,6 +22,9 @@ use std::fs;
 use std::sync::LazyLock;
 use std::time::Instant;
 
+/// Joints of the Jaco, and of its arm.
+const JOINTS: usize = 9;
+const ARM_JOINTS: usize = 6;
 /// Positions and yaws of the scripted trials.
 const POSITIONS: u64 = 20;
 /// Control steps of 5 s.
@@ -35,9 +39,10 @@ const RAM_M: f64 = -0.15;
 
 /// `count` planned scenes of a task.
 pub fn plans(task: Task, count: u64) -> Vec<Plan> {
-    let mut planner = Planner::new(&PlanSettings::default());
+    let mut planner = Planner::new(&paper_robot(), &PlanSettings::default());
     let settings = SceneSettings::default();
-    let scenes = (0..count).map(|i| draw_scene(task, &settings, &mut stream(0, "scene", i)).expect("the default area has room"));
+    let scenes = (0..count)
+        .map(|i| draw_scene(&paper_robot(), task, &settings, &mut stream(0, "scene", i)).expect("the default area has room"));
     let plan = |(i, scene)| planner.plan(i, &scene, &mut stream(0, "plan", i)).expect("every default scene has a plan");
     (0..count).zip(scenes).map(plan).collect()
 }
@@ -61,7 +66,7 @@ pub fn scripted_episode(plan: &Plan, physics: Physics, noise_variance: f64) -> E
 
 fn run(plan: &Plan, controller: &mut dyn Controller, physics: Physics, noise_variance: f64) -> End {
     let settings = SimulateSettings { noise_variance, ..SimulateSettings::default() };
-    let mut disturbance = Disturbance::new(&settings, stream(0, "simulate.noise", plan.index));
+    let mut disturbance = Disturbance::new(&paper_robot(), &settings, stream(0, "simulate.noise", plan.index));
     let mut world = World::with(&plan.scene, physics);
     let mut monitor = Monitor::new(&plan.scene);
     let mut seen = world.observe();
@@ -109,7 +114,9 @@ pub struct Errors {
 /// All scripted trials.
 pub fn errors(physics: Physics) -> Errors {
     let settings = SceneSettings { yaw: true, ..SceneSettings::default() };
-    let scene = |task, index| draw_scene(task, &settings, &mut stream(7, "study", index)).expect("the default area has room");
+    let scene = |task, index| {
+        draw_scene(&paper_robot(), task, &settings, &mut stream(7, "study", index)).expect("the default area has room")
+    };
     let of = |trial: &dyn Fn(u64) -> f64| {
         let mut all: Vec<f64> = (0..POSITIONS).map(trial).collect();
         all.sort_by(f64::total_cmp);
@@ -125,13 +132,13 @@ pub fn errors(physics: Physics) -> Errors {
 }
 
 /// The block's centre as the hand sees it.
-fn in_hand(arm: &Arm, seen: &Observation) -> Vector3<f64> {
-    arm.tool_pose(&seen.state.q_rad).inverse_transform_point(&Point3::from(seen.state.block.position_m)).coords
+fn in_hand(arm: &Robot, seen: &Observation) -> Vector3<f64> {
+    arm.tool_pose(&seen.state.q).inverse_transform_point(&Point3::from(seen.state.block.position_m)).coords
 }
 
 /// Slip of a lifted block while joint 1 swings with this amplitude \[rad/s\].
 fn slip(scene: &Scene, physics: Physics, swing_rad_s: f64) -> f64 {
-    let (arm, mut world, mut script) = (Arm::new(), World::with(scene, physics), Script::lift(&scene.block));
+    let (arm, mut world, mut script) = (paper_robot(), World::with(scene, physics), Script::lift(&scene.block));
     let mut rested = 0;
     while rested < FIVE_SECONDS / 2 {
         rested += usize::from(script.on_last_leg());
@@ -141,7 +148,7 @@ fn slip(scene: &Scene, physics: Physics, swing_rad_s: f64) -> f64 {
     let before = in_hand(&arm, &world.observe());
     for step in 0..FIVE_SECONDS {
         let speed = swing_rad_s * sin_cos(TAU * step as f64 * CONTROL_DT_S / SWING_PERIOD_S).0;
-        world.step(&std::array::from_fn(|i| {
+        world.step(&Joints::from_fn(JOINTS, |i| {
             if i == 0 {
                 speed
             } else if i < ARM_JOINTS {
@@ -161,7 +168,7 @@ fn drift(mut scene: Scene, physics: Physics) -> f64 {
     scene.block = Pose { position_m: [x + 0.005, y - 0.005, z + BLOCK_EDGE_M], ..scene.block };
     let mut world = World::with(&scene, physics);
     for _ in 0..FIVE_SECONDS {
-        world.step(&[0.0; JOINTS]);
+        world.step(&Joints::zeros(JOINTS));
     }
     (Vector3::from(world.observe().state.block.position_m) - Vector3::from(scene.block.position_m)).norm()
 }
@@ -173,13 +180,8 @@ fn rammed(scene: &Scene, physics: Physics) -> f64 {
     let mut deepest: f64 = 0.0;
     for _ in 0..2 * FIVE_SECONDS {
         let (seen, links) = (world.observe(), world.link_poses());
-        for primitive in LINK_SHAPES.iter().filter(|primitive| primitive.link > HAND_LINK) {
-            let Shape::Box { center_m, half_m } = primitive.shape else { continue };
-            let pose = links[primitive.link];
-            let axes = pose.rotation.to_rotation_matrix();
-            let reach: f64 = (0..3).map(|i| axes[(2, i)].abs() * half_m[i]).sum();
-            deepest = deepest.max(reach - (pose * Point3::from(center_m)).z);
-        }
+        let fingers = scene.robot.solids(&links).into_iter().filter(|(link, _)| *link > scene.robot.hand());
+        deepest = fingers.fold(deepest, |deepest, (_, finger)| deepest.max(-finger.lowest_m()));
         world.step(&script.command(&seen));
     }
     deepest
@@ -188,13 +190,13 @@ fn rammed(scene: &Scene, physics: Physics) -> f64 {
 /// The arm under noise alone, the block out of its way.
 fn tracking(mut scene: Scene, physics: Physics, index: u64) -> f64 {
     scene.block.position_m = [0.1, 0.7, BLOCK_EDGE_M / 2.0];
-    let mut noise = Disturbance::new(&SimulateSettings::default(), stream(0, "tracking", index));
+    let mut noise = Disturbance::new(&paper_robot(), &SimulateSettings::default(), stream(0, "tracking", index));
     let mut world = World::with(&scene, physics);
     let mut worst: f64 = 0.0;
     for _ in 0..FIVE_SECONDS {
-        let (before, action) = (world.observe().state.q_rad, noise.apply(&[0.0; JOINTS]));
+        let (before, action) = (world.observe().state.q, noise.apply(&Joints::zeros(JOINTS)));
         world.step(&action);
-        let after = world.observe().state.q_rad;
+        let after = world.observe().state.q;
         worst = (0..ARM_JOINTS).fold(worst, |w, i| w.max((after[i] - before[i] - CONTROL_DT_S * action[i]).abs()));
     }
     worst

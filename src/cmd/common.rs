@@ -21,6 +21,9 @@ pub struct SettingsArgs {
     /// Task: pick-up, pick-and-place or stack
     #[arg(long, value_name = "TASK")]
     task: Option<Task>,
+    /// Robot: jaco, panda, ur5e, or the TOML file of another [default: that of the pipeline, jaco]
+    #[arg(long, value_name = "NAME|FILE.toml")]
+    robot: Option<String>,
     /// Pipeline file with the settings of every stage [default: the one of the task that comes with hilt]
     #[arg(long, value_name = "FILE")]
     pipeline: Option<PathBuf>,
@@ -45,7 +48,8 @@ pub type Flag<'a> = (&'a str, Option<String>);
 impl SettingsArgs {
     /// What these settings are read from, where that is a file.
     pub fn places(&self) -> Places {
-        Places::new().read_all(self.pipeline.as_deref())
+        let robot = self.robot.as_deref().map(Path::new).filter(|path| path.is_file());
+        Places::new().read_all(self.pipeline.as_deref().into_iter().chain(robot))
     }
 
     /// The resolved settings; `flags` are dotted keys with the values of the stage's own flags, where given.
@@ -61,12 +65,16 @@ impl SettingsArgs {
                 return Err(Error::Usage(format!("which task? give --task ({tasks}) or --pipeline FILE")));
             }
         };
-        let given: Vec<(String, String)> =
-            flags.iter().filter_map(|(key, value)| value.as_ref().map(|v| (format!("{key}={v}"), flag_text(key, v)))).collect();
+        let robot = ("robot", self.robot.clone());
+        let given: Vec<(String, String)> = [&robot]
+            .into_iter()
+            .chain(flags)
+            .filter_map(|(key, value)| value.as_ref().map(|v| (format!("{key}={v}"), flag_text(key, v))))
+            .collect();
         let mut sets = split(self.sets.as_deref().unwrap_or_default());
         sets.extend(self.set.iter().chain(given.iter().map(|(set, _)| set)).cloned());
         let pipeline = Pipeline::load(&source, &sets).map_err(|e| in_words_of_flags(e, &given))?;
-        check_ready_pose(&pipeline.scene)?;
+        check_ready_pose(&pipeline.robot, &pipeline.scene)?;
         Ok(pipeline)
     }
 
@@ -115,9 +123,10 @@ fn in_words_of_flags(error: Error, given: &[(String, String)]) -> Error {
     Error::Usage(flag.map_or_else(|| message.clone(), |(flag, rest)| format!("{flag}{rest}")))
 }
 
-/// The given path, or `name` under `runs/<task>/`.
-pub fn path_or(given: Option<&Path>, task: Task, name: &str) -> PathBuf {
-    given.map_or_else(|| Path::new(RUNS).join(task.name()).join(name), Path::to_path_buf)
+/// The given path, or `name` under `runs/<task>/`, of another robot than the paper's under `runs/<robot>/<task>/`.
+pub fn path_or(given: Option<&Path>, pipeline: &Pipeline, name: &str) -> PathBuf {
+    let robot = if pipeline.robot.is_default() { "" } else { pipeline.robot.name.as_str() };
+    given.map_or_else(|| Path::new(RUNS).join(robot).join(pipeline.task.name()).join(name), Path::to_path_buf)
 }
 
 /// Refuses an input that was made for another task.
@@ -134,37 +143,58 @@ pub fn same_task(path: &Path, made_for: Task, task: Task) -> Result<()> {
     ))
 }
 
-/// A network of `task` from its weights: `make` makes it of their tensors and description, `layout` says what its rows hold.
+/// A network of the robot and task of `pipeline` from its weights: `make` makes it of their tensors and description, `layout` says what its rows hold.
 ///
 /// # Errors
 /// What reading returns; [`Error::Input`] for weights of another task, kind or layout, or that are no such network.
 pub fn read_network<N>(
     path: &Path,
     kind: &str,
-    task: Task,
+    pipeline: &Pipeline,
     make: fn(&[NamedTensor], &Value) -> std::result::Result<N, String>,
     layout: fn(&N) -> &Layout,
 ) -> Result<(N, Provenance, ContentHash)> {
     let (tensors, description, made, content) = weights::read_hashed(path, kind)?;
-    same_task(path, made.task, task)?;
+    same_task(path, made.task, pipeline.task)?;
     let network = make(&tensors, &with_layout(description)).map_err(|why| Error::input(path, why))?;
-    same_layout(path, layout(&network), task)?;
+    same_layout(path, layout(&network), pipeline)?;
     Ok((network, made, content))
 }
 
-/// Refuses a network whose rows are not those of the task.
-fn same_layout(path: &Path, layout: &Layout, task: Task) -> Result<()> {
-    let ours = task.layout();
+/// Refuses what another robot made; what does not say by whom was made by the Jaco, when there was no other.
+///
+/// # Errors
+/// [`Error::Input`] naming both.
+pub fn same_robot(path: &Path, made: &Provenance, pipeline: &Pipeline) -> Result<()> {
+    let theirs = &made.settings["robot"];
+    let same = match theirs["content"].as_str() {
+        None => pipeline.robot.is_default(),
+        Some(content) => content == pipeline.robot.content(),
+    };
+    if same {
+        return Ok(());
+    }
+    let (theirs, ours) = (theirs["name"].as_str().unwrap_or("jaco"), &pipeline.robot.name);
+    let hint = if theirs == ours { ", or its files have changed since".to_string() } else { format!("; give --robot {theirs}") };
+    Err(Error::input(path, format!("was made by robot {theirs}, but {ours} is asked for{hint}, or make it anew")))
+}
+
+/// Refuses rows that are not those of the robot in the task.
+///
+/// # Errors
+/// [`Error::Input`] with the numbers of both.
+pub fn same_layout(path: &Path, layout: &Layout, pipeline: &Pipeline) -> Result<()> {
+    let ours = pipeline.task.layout(&pipeline.robot);
     if *layout == *ours {
         return Ok(());
     }
     let [theirs, ours] =
         [layout, &*ours].map(|l| format!("states of {} numbers and actions of {}", l.state_dim(), l.action_dim()));
+    let robot = &pipeline.robot.name;
+    let advice = "give --robot, or make it anew";
     Err(Error::input(
         path,
-        format!(
-            "was trained on {theirs}, this robot in this task has {ours}, or in another order (\"layout\" of its description); train it anew"
-        ),
+        format!("has {theirs}; {robot} in this task has {ours}, or in another order (\"layout\" says which): {advice}"),
     ))
 }
 

@@ -1,12 +1,11 @@
-use super::common::{SettingsArgs, path_or, same_task};
+use super::common::{SettingsArgs, path_or, same_robot, same_task};
 use super::places::Content;
 use super::{Console, Context, Outcome, Progress, dropped};
-use crate::config::Stage;
+use crate::config::{Pipeline, Stage};
 use crate::data::dataset::{self, DatasetEpisode, Episodes, Fingerprint};
 use crate::data::{ContentHash, recording};
 use crate::demo::Episode;
 use crate::error::{Error, Result};
-use crate::task::Task;
 use rayon::prelude::*;
 use std::borrow::Cow;
 use std::collections::BTreeSet;
@@ -49,8 +48,8 @@ struct Found {
 
 pub fn run(args: &Args, context: &Context) -> Result<Outcome> {
     let pipeline = args.settings.resolve(&[])?;
-    let dir = path_or(args.recordings.as_deref(), pipeline.task, "recordings");
-    let out = path_or(args.out.as_deref(), pipeline.task, "dataset");
+    let dir = path_or(args.recordings.as_deref(), &pipeline, "recordings");
+    let out = path_or(args.out.as_deref(), &pipeline, "dataset");
     args.settings.places().read(&dir).write("--out", &out, Content::Datasets).check(&context.console)?;
     let files = recording::files(&dir)?;
     if files.is_empty() {
@@ -63,7 +62,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome> {
         .par_iter()
         .map(|path| {
             context.interrupt.check()?;
-            let found = find(path, pipeline.task, pipeline.convert.keep_failed, &room);
+            let found = find(path, &pipeline, &room);
             progress.step();
             found
         })
@@ -94,7 +93,14 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome> {
     let names = files.iter().filter_map(|path| path.file_name()?.to_str());
     let content = ContentHash::of_directory(names.zip(hashes));
     let provenance = args.settings.provenance(Stage::Convert, &pipeline, &[("recordings", content)])?;
-    dataset::write_split(&out, pipeline.task, &pick(&train), &pick(&validation), &provenance, &context.interrupt)?;
+    dataset::write_split(
+        &out,
+        (&pipeline.robot, pipeline.task),
+        &pick(&train),
+        &pick(&validation),
+        &provenance,
+        &context.interrupt,
+    )?;
     progress.into_iter().for_each(|progress| progress.finish(""));
     let (to, t, v) = (out.display(), train.len(), validation.len());
     context.console.say(&format!("convert: wrote {to}: {t} training and {v} validation episodes"));
@@ -112,11 +118,12 @@ impl Room {
 }
 
 /// The hash of a recording's bytes, and what is kept of it; a failed episode is dropped.
-fn find(path: &Path, task: Task, keep_failed: bool, room: &Room) -> Result<(ContentHash, dropped::Kept<Found>)> {
+fn find(path: &Path, pipeline: &Pipeline, room: &Room) -> Result<(ContentHash, dropped::Kept<Found>)> {
     let (episode, made, hash) = recording::read_hashed(path)?;
-    same_task(path, episode.scene.task, task)?;
+    same_task(path, episode.scene.task, pipeline.task)?;
+    same_robot(path, &made, pipeline)?;
     let number = path.file_name().and_then(|name| recording::number_of(name.to_str()?)).unwrap_or(episode.index);
-    if let Some(class) = episode.failure.filter(|_| !keep_failed) {
+    if let Some(class) = episode.failure.filter(|_| !pipeline.convert.keep_failed) {
         return Ok((hash, Err(format!("episode {number} failed, {}: {}", class.name(), class.words()))));
     }
     let taken = taken(path, &episode, number)?;
@@ -177,7 +184,9 @@ mod tests {
         let dir = tempfile::tempdir().expect("temporary directory");
         let path = dir.path().join("episode-00007.mcap");
         std::fs::copy(fixture, &path).expect("copied");
-        let found = |bytes: usize| find(&path, Task::PickUp, true, &Room(AtomicUsize::new(bytes))).expect("a recording").1;
+        let mut pipeline = Pipeline::defaults(crate::task::Task::PickUp);
+        pipeline.convert.keep_failed = true;
+        let found = |bytes: usize| find(&path, &pipeline, &Room(AtomicUsize::new(bytes))).expect("a recording").1;
         let (held, again) = (found(HELD_BYTES).expect("kept"), found(0).expect("kept"));
         assert!(held.held.is_some() && again.held.is_none());
         let [one, other] = [&held, &again].map(|found| found.episode(None).expect("an episode"));
@@ -185,7 +194,7 @@ mod tests {
 
         let (mut episode, made) = recording::read(&path).expect("a recording");
         episode.steps[0].commanded[0] += 0.1;
-        recording::write(&path, &episode, "<robot/>", &made).expect("written");
+        recording::write(&path, &episode, &made).expect("written");
         let said = again.episode(None).expect_err("refused").to_string();
         assert!(said.contains("episode-00007.mcap: changed while"), "{said}");
         assert!(held.episode(None).is_ok(), "what is held is not read again");

@@ -12,7 +12,6 @@ use crate::interrupt::Interrupt;
 use crate::learn::Policy;
 use crate::plan::Planner;
 use crate::report::table::text_table;
-use crate::robot::urdf;
 use crate::scene::Scene;
 use crate::seed;
 use crate::sim::{Controller, Follower};
@@ -62,7 +61,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome> {
     let episodes = ("evaluate.episodes", args.episodes.map(|n| n.to_string()));
     let stochastic = ("evaluate.stochastic", args.stochastic.then(|| "true".to_string()));
     let pipeline = args.settings.resolve(&[episodes, stochastic])?;
-    let path = path_or(args.policy.as_deref(), pipeline.task, "policy.safetensors");
+    let path = path_or(args.policy.as_deref(), &pipeline, "policy.safetensors");
     let log = args.out.as_deref().map(|out| beside(out, "episodes.parquet"));
     args.places(&path, log.as_deref()).check(&context.console)?;
     let (subject, inputs, trained) = match path.as_path() {
@@ -114,7 +113,7 @@ impl Args {
 }
 
 fn read_policy(path: &Path, pipeline: &Pipeline) -> Result<(Policy, Provenance, ContentHash)> {
-    read_network(path, train::KIND, pipeline.task, Policy::from_tensors, |policy| policy.layout())
+    read_network(path, train::KIND, pipeline, Policy::from_tensors, |policy| policy.layout())
 }
 
 /// Sections of the settings that make an episode what it is.
@@ -164,7 +163,7 @@ impl Subject {
         match self {
             Subject::Planner => {
                 let mut rng = seed::stream(rollouts.seed, "evaluate.search", index);
-                let mut planner = Planner::new(&rollouts.pipeline.plan).with_interrupt(interrupt);
+                let mut planner = Planner::new(&rollouts.pipeline.robot, &rollouts.pipeline.plan).with_interrupt(interrupt);
                 let plan = planner.plan(index, scene, &mut rng).ok()?;
                 Some(Box::new(Follower::new(&plan)?))
             }
@@ -202,11 +201,11 @@ fn record_all(
     context: &Context,
     provenance: &Provenance,
 ) -> Result<Vec<Trial>> {
-    let (robot, mut trials) = (urdf(), Vec::new());
+    let mut trials = Vec::new();
     atomic::write_dir(dir, recording::is_file, |fresh| {
         trials = run_all(rollouts, subject, context, |episode| {
             let file = fresh.join(recording::file_name(episode.index));
-            atomic::write_new(&file, &recording::encode(&file, episode, &robot, provenance)?)
+            atomic::write_new(&file, &recording::encode(&file, episode, provenance)?)
         })?;
         Ok(())
     })?;

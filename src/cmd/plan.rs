@@ -35,7 +35,7 @@ const ADVICE: &str = "change the scene (scene.spawn_x_m, scene.spawn_y_m, scene.
 
 pub fn run(args: &Args, context: &Context) -> Result<Outcome> {
     let pipeline = args.settings.resolve(&[("plan.episodes", args.episodes.map(|n| n.to_string()))])?;
-    let out = path_or(args.out.as_deref(), pipeline.task, "plans.parquet");
+    let out = path_or(args.out.as_deref(), &pipeline, "plans.parquet");
     let kept = unfinished::beside_file(&out)?;
     if let (Some(shard), None) = (args.shard, &kept) {
         let out = out.display();
@@ -95,7 +95,7 @@ impl PlanStage<'_> {
         let begun = Mutex::new(BTreeMap::<Block, Planned>::new());
         let episodes = missing.iter().flat_map(|block| block.episodes().map(|episode| (*block, episode)));
         episodes.par_bridge().try_for_each_init(
-            || Planner::new(&self.pipeline.plan).with_interrupt(&self.context.interrupt),
+            || Planner::new(&self.pipeline.robot, &self.pipeline.plan).with_interrupt(&self.context.interrupt),
             |planner, (block, episode)| {
                 let planned = self.plan_one(planner, episode)?;
                 progress.step();
@@ -115,7 +115,7 @@ impl PlanStage<'_> {
     fn plan_one(&self, planner: &mut Planner, episode: u64) -> Result<dropped::Kept<Plan>> {
         self.context.interrupt.check()?;
         let mut rng = seed::stream(self.seed, "plan.scene", episode);
-        let scene = draw_scene(self.pipeline.task, &self.pipeline.scene, &mut rng)?;
+        let scene = draw_scene(&self.pipeline.robot, self.pipeline.task, &self.pipeline.scene, &mut rng)?;
         let plan = planner.plan(episode, &scene, &mut seed::stream(self.seed, "plan.search", episode));
         self.context.interrupt.check()?;
         Ok(plan.map_err(|e| format!("episode {episode}: {e}")))
@@ -124,7 +124,7 @@ impl PlanStage<'_> {
     fn keep(&self, block: Block, mut planned: Planned) -> Result<()> {
         planned.sort_by_key(|(episode, _)| *episode);
         let (name, episodes) = (block.file_name(), planned.len() as u64);
-        let bytes = table_file::encode(&self.work.at(&name), &block_to_table(planned), self.provenance)?;
+        let bytes = table_file::encode(&self.work.at(&name), &block_to_table(&self.pipeline.robot, planned), self.provenance)?;
         self.work.put(&name, &bytes, episodes)
     }
 
@@ -148,7 +148,7 @@ impl PlanStage<'_> {
         if origin != *self.provenance {
             return Err(Error::input(&path, "is a piece of another run; remove it"));
         }
-        block_from_table(block, table).map_err(|why| Error::input(&path, why))
+        block_from_table(&self.pipeline.robot, block, table).map_err(|why| Error::input(&path, why))
     }
 
     /// Writes the plans of all blocks, a block a row group; returns why episodes were dropped.
@@ -157,7 +157,7 @@ impl PlanStage<'_> {
         let groups = blocks.iter().filter_map(|block| {
             let planned = self.context.interrupt.check().and_then(|()| self.read(*block));
             let plans = planned.map(|planned| split(planned, &mut reasons));
-            plans.map(|plans| (!plans.is_empty()).then(|| to_table(&plans))).transpose()
+            plans.map(|plans| (!plans.is_empty()).then(|| to_table(&self.pipeline.robot, &plans))).transpose()
         });
         table_file::write_groups(out, groups, self.provenance)?;
         Ok(reasons)

@@ -1,4 +1,4 @@
-use super::common::{SettingsArgs, path_or};
+use super::common::{SettingsArgs, path_or, same_layout};
 use super::epochs::Epochs;
 use super::places::{Content, beside};
 use super::{Context, Outcome, dropped, output};
@@ -31,8 +31,8 @@ pub struct Args {
 
 pub fn run(args: &Args, context: &Context) -> Result<Outcome> {
     let pipeline = args.settings.resolve(&[])?;
-    let dir = path_or(args.dataset.as_deref(), pipeline.task, "dataset");
-    let out = path_or(args.out.as_deref(), pipeline.task, "dynamics.safetensors");
+    let dir = path_or(args.dataset.as_deref(), &pipeline, "dataset");
+    let out = path_or(args.out.as_deref(), &pipeline, "dynamics.safetensors");
     let (errors, metrics) = (beside(&out, "errors.parquet"), beside(&out, "pretraining.parquet"));
     let places = args.settings.places().read(&dir).write("--out", &out, Content::Weights(KIND, "pretrain"));
     let places = places.write("the table of errors", &errors, Content::Table("pretrain"));
@@ -73,7 +73,7 @@ fn reexecute(demos: &[Demo], pipeline: &Pipeline, seed: u64, context: &Context) 
         let rng = seed::stream(seed, "pretrain.reexecute", index);
         let episode = sim::reexecute(
             index,
-            (pipeline.task, demo),
+            (&pipeline.robot, pipeline.task, demo),
             &pipeline.scene,
             &settings,
             &pipeline.pretrain.reexecute_fingers,
@@ -111,6 +111,7 @@ pub fn demos(dir: &Path, pipeline: &Pipeline) -> Result<Demos> {
     let mut files = BTreeMap::new();
     let mut read = |name: &str| -> Result<Vec<Demo>> {
         let found = dataset::read_for(&dir.join(name), pipeline.task)?;
+        same_layout(&dir.join(name), &found.layout, pipeline)?;
         files.extend(found.files.into_iter().map(|(file, hash)| (format!("{name}/{file}"), hash)));
         Ok(found.demos)
     };

@@ -16,6 +16,9 @@ pub struct Args {
 pub fn run(args: &Args, context: &Context) -> Result<Outcome> {
     args.settings.places().check(&context.console)?;
     let pipeline = args.settings.resolve(&[])?;
-    output::print(&format!("# seed {}\n{}", args.settings.seed, pipeline.to_toml(args.stage)?))?;
+    // What the files of a robot say belongs to the settings, as `make` compares them.
+    let robot = &pipeline.robot;
+    let content = if robot.is_default() { String::new() } else { format!("# robot {} {}\n", robot.name, robot.content()) };
+    output::print(&format!("# seed {}\n{content}{}", args.settings.seed, pipeline.to_toml(args.stage)?))?;
     Ok(Outcome::Done)
 }

@@ -1,4 +1,4 @@
-use super::common::{SettingsArgs, path_or, same_task};
+use super::common::{SettingsArgs, path_or, same_robot, same_task};
 use super::places::Content;
 use super::shard::Shard;
 use super::unfinished::{self, Unfinished};
@@ -8,13 +8,14 @@ use crate::data::{Provenance, atomic, recording, table_file};
 use crate::demo::Episode;
 use crate::error::{Error, Result};
 use crate::plan::{Plan, Plans};
-use crate::robot::urdf::urdf;
+use crate::robot::Robot;
 use crate::seed;
 use crate::sim::{Disturbance, Follower, run_episode};
 use crate::task::FailureClass;
 use rayon::prelude::*;
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 /// Execute plans in contact physics, with noise on every command, and record each episode as an MCAP file. Stopped, the same command goes on.
@@ -38,14 +39,15 @@ pub struct Args {
 
 pub fn run(args: &Args, context: &Context) -> Result<Outcome> {
     let pipeline = args.settings.resolve(&[])?;
-    let path = path_or(args.plans.as_deref(), pipeline.task, "plans.parquet");
-    let out = path_or(args.out.as_deref(), pipeline.task, "recordings");
+    let path = path_or(args.plans.as_deref(), &pipeline, "plans.parquet");
+    let out = path_or(args.out.as_deref(), &pipeline, "recordings");
     let kept = unfinished::beside_dir(&out)?;
     let places = args.settings.places().read(&path).write("--out", &out, Content::Recordings("simulate"));
     places.write("the directory of what is unfinished", &kept, Content::Pieces).check(&context.console)?;
     let plans = table_file::Reader::open(&path)?;
     same_task(&path, plans.provenance().task, pipeline.task)?;
-    let mut numbers = check_plans(&path, &plans, context)?;
+    same_robot(&path, plans.provenance(), &pipeline)?;
+    let mut numbers = check_plans(&path, &pipeline.robot, &plans, context)?;
     numbers.truncate(args.episodes.map_or(usize::MAX, |n| n as usize));
     let provenance = args.settings.provenance(Stage::Simulate, &pipeline, &[("plans", plans.content())])?;
 
@@ -60,7 +62,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome> {
         context,
         totals: Totals::default(),
     };
-    let done = stage.simulate(&share, Plans::new(&path, plans.tables()?)).and_then(|()| match args.shard {
+    let done = stage.simulate(&share, Plans::new(&path, &pipeline.robot, plans.tables()?)).and_then(|()| match args.shard {
         Some(shard) => {
             work.say_shared(shard);
             Ok(false)
@@ -79,13 +81,13 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome> {
 }
 
 /// Reads all plans before the work begins, so that what cannot be executed is known then; returns their numbers.
-fn check_plans(path: &Path, plans: &table_file::Reader, context: &Context) -> Result<Vec<u64>> {
+fn check_plans(path: &Path, robot: &Arc<Robot>, plans: &table_file::Reader, context: &Context) -> Result<Vec<u64>> {
     let number = |plan: Result<Plan>| {
         context.interrupt.check()?;
         let plan = plan?;
         follower(path, &plan).map(|_| plan.index)
     };
-    let numbers = Plans::new(path, plans.tables()?).map(number).collect::<Result<Vec<_>>>()?;
+    let numbers = Plans::new(path, robot, plans.tables()?).map(number).collect::<Result<Vec<_>>>()?;
     if numbers.is_empty() {
         return Err(Error::input(path, "holds no plan; run `hilt plan` again"));
     }
@@ -129,11 +131,10 @@ impl SimulateStage<'_> {
         let done = self.done(share)?;
         let progress = self.context.console.progress("simulate", share.len() as u64, "episodes").after(done.len() as u64);
         let missing: HashSet<u64> = share.iter().copied().filter(|number| !done.contains(number)).collect();
-        let robot = urdf();
         // One by one, in order: the plans are in memory a few at a time.
         let wanted = plans.filter(|plan| plan.as_ref().map_or(true, |plan| missing.contains(&plan.index)));
         wanted.par_bridge().try_for_each(|plan| {
-            self.record(&plan?, &robot)?;
+            self.record(&plan?)?;
             progress.step();
             Ok(())
         })?;
@@ -149,16 +150,16 @@ impl SimulateStage<'_> {
         Ok(())
     }
 
-    fn record(&self, plan: &Plan, robot: &str) -> Result<()> {
+    fn record(&self, plan: &Plan) -> Result<()> {
         let interrupt = &self.context.interrupt;
         interrupt.check()?;
         let name = recording::file_name(plan.index);
         let noise = seed::stream(self.seed, "simulate.noise", plan.index);
-        let mut disturbance = Disturbance::new(self.settings, noise);
+        let mut disturbance = Disturbance::new(&plan.scene.robot, self.settings, noise);
         let mut follower = follower(&self.work.at(&name), plan)?;
         let episode = run_episode(plan.index, &plan.scene, &mut follower, &mut disturbance, self.settings.max_steps, interrupt)?;
         self.totals.add(&episode);
-        self.work.put(&name, &recording::encode(&self.work.at(&name), &episode, robot, self.provenance)?, 1)
+        self.work.put(&name, &recording::encode(&self.work.at(&name), &episode, self.provenance)?, 1)
     }
 
     /// The episodes of this share that are recorded already; says how many.

@@ -12,7 +12,6 @@ use crate::interrupt::Interrupt;
 use crate::learn::{self, BcRl, Checkpoint, Dynamics, Hooks, Inputs, Method, MethodName, Policy, Ppo, Selection, imitator};
 use crate::scene::Scene;
 use crate::sim::{Controller, TaskEnv};
-use crate::task::Task;
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -59,12 +58,12 @@ pub struct Args {
 pub fn run(args: &Args, context: &Context) -> Result<Outcome> {
     let pipeline =
         args.settings.resolve(&[("train.rho", args.rho.map(|v| v.to_string())), ("train.alpha", args.alpha.clone())])?;
-    let dir = path_or(args.dataset.as_deref(), pipeline.task, "dataset");
-    let model = path_or(args.dynamics.as_deref(), pipeline.task, "dynamics.safetensors");
+    let dir = path_or(args.dataset.as_deref(), &pipeline, "dataset");
+    let model = path_or(args.dynamics.as_deref(), &pipeline, "dynamics.safetensors");
     let method = args.method.name();
     // As `make all METHOD=bc` has it: another method replaces no policy of hil.
     let name = if args.method == MethodName::Hil { "policy.safetensors".into() } else { format!("policy-{method}.safetensors") };
-    let out = path_or(args.out.as_deref(), pipeline.task, &name);
+    let out = path_or(args.out.as_deref(), &pipeline, &name);
     let metrics = args.metrics.clone().unwrap_or_else(|| beside(&out, "training.parquet"));
     let needs_demos = args.method.needs_demos();
     let needs_model = args.method.needs_dynamics() || args.method == MethodName::Bc && args.dynamics.is_some();
@@ -76,7 +75,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome> {
     let checkpoint = if args.resume { Content::Own } else { Content::Weights(weights::CHECKPOINT, "train") };
     places.write("the checkpoint", &kept, checkpoint).check(&context.console)?;
     let (demos, dataset) = needs_demos.then(|| read_demos(&dir, &pipeline)).transpose()?.unzip();
-    let (dynamics, model) = needs_model.then(|| read_dynamics(&model, pipeline.task)).transpose()?.unzip();
+    let (dynamics, model) = needs_model.then(|| read_dynamics(&model, &pipeline)).transpose()?.unzip();
     let inputs = [dataset.map(|content| ("dataset", content)), model.map(|content| ("dynamics", content))];
     let inputs: Vec<_> = inputs.into_iter().flatten().collect();
     let mut provenance = args.settings.provenance(Stage::Train, &pipeline, &inputs)?;
@@ -90,7 +89,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome> {
     let reward = if args.method == MethodName::BcRl { settings.bc_rl.reward } else { settings.ppo.reward };
     let world = |horizon_steps| -> Result<Box<dyn Env>> { Ok(Box::new(TaskEnv::new(&pipeline, reward, horizon_steps, seed))) };
     let learner: Box<dyn Method> = match demos {
-        None => Box::new(Ppo::new(&pipeline.task.layout(), settings, seed, world)?),
+        None => Box::new(Ppo::new(&pipeline.task.layout(&pipeline.robot), settings, seed, world)?),
         Some(inputs) if args.method == MethodName::BcRl => Box::new(BcRl::new(inputs, settings, seed, world)?),
         Some(inputs) => imitator(args.method, inputs, dynamics, settings, seed)?,
     };
@@ -151,7 +150,8 @@ fn read_demos(dir: &Path, pipeline: &Pipeline) -> Result<(Inputs, ContentHash)> 
     Ok((Inputs::new(train, validation)?, content))
 }
 
-fn read_dynamics(path: &Path, task: Task) -> Result<(Dynamics, ContentHash)> {
-    let (dynamics, _, content) = read_network(path, pretrain::KIND, task, Dynamics::from_tensors, |dynamics| dynamics.layout())?;
+fn read_dynamics(path: &Path, pipeline: &Pipeline) -> Result<(Dynamics, ContentHash)> {
+    let (dynamics, _, content) =
+        read_network(path, pretrain::KIND, pipeline, Dynamics::from_tensors, |dynamics| dynamics.layout())?;
     Ok((dynamics, content))
 }

@@ -1,6 +1,7 @@
 //! From a preset or a pipeline file and `--set` words to a checked [`Pipeline`].
 
 use super::ranges::Range;
+use super::robot::is_file;
 use super::{Pipeline, Preset, check};
 use crate::error::{Error, Result};
 use crate::interrupt;
@@ -12,6 +13,8 @@ use std::path::{Path, PathBuf};
 
 /// A pipeline file with every key is 4 kB long; this leaves room for comments and boxes \[bytes\].
 const LONGEST_FILE: u64 = 1 << 20;
+/// The key outside of all sections that may be overridden.
+const ROBOT: &str = "robot";
 /// Parts of a dotted key: stage, sections, key.
 const MOST_PARTS: usize = 4;
 
@@ -39,6 +42,9 @@ impl Pipeline {
         };
         let mut own = parsed(&text, &origin)?;
         agree_on_task(&mut own, task, &origin)?;
+        if let Source::File(path, _) = source {
+            beside(path, &mut own);
+        }
         let mut table = extended(own, &origin)?;
         let mut pipeline = check::resolve(table.clone(), &origin)?;
         for set in sets {
@@ -47,6 +53,14 @@ impl Pipeline {
             pipeline = check::resolve(table.clone(), &origin)?;
         }
         Ok(pipeline)
+    }
+}
+
+/// A robot's file is named relative to the pipeline file that names it.
+fn beside(pipeline: &Path, own: &mut toml::Table) {
+    let said = own.get(ROBOT).and_then(toml::Value::as_str).filter(|said| is_file(said));
+    if let Some(file) = said.map(|said| pipeline.parent().unwrap_or(Path::new("")).join(said)) {
+        own.insert(ROBOT.into(), file.display().to_string().into());
     }
 }
 
@@ -128,14 +142,14 @@ fn apply(table: &mut toml::Table, set: &str, origin: &str) -> Result<()> {
         return refuse(format!("a key of {count} parts; none has more than {MOST_PARTS} (`hilt settings` prints all keys)"));
     }
     let parts: Vec<&str> = key.split('.').collect();
-    if parts.len() < 2 || parts.iter().any(|p| p.is_empty()) {
+    if parts.len() < 2 && key != ROBOT || parts.iter().any(|p| p.is_empty()) {
         return refuse(format!("\"{}\" is not a key of the form stage.key{}", shown(key), check::hint(key)));
     }
     let value = match parse_value(value) {
         Ok(value) => value,
         Err(why) => return refuse(format!("{key} = {}: {}", shown(value), why.words(key))),
     };
-    let (last, sections) = parts.split_last().expect("a key has at least two parts");
+    let (last, sections) = parts.split_last().expect("a key has parts");
     let mut at = table;
     for section in sections {
         let entry = at.entry(*section).or_insert_with(|| toml::Value::Table(toml::Table::new()));

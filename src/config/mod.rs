@@ -11,6 +11,7 @@ mod ppo;
 mod preset;
 mod pretrain;
 mod ranges;
+mod robot;
 mod sc;
 mod scene;
 mod train;
@@ -25,6 +26,7 @@ pub use ppo::{PpoSettings, RewardKind};
 pub use preset::Preset;
 pub use pretrain::PretrainSettings;
 pub use ranges::{MOST_LAYERS, MOST_STEPS, MOST_UNITS};
+pub use robot::ChosenRobot;
 pub use sc::ScSettings;
 pub use scene::{FingerPulses, PlanSettings, PulseSettings, SceneSettings, SimulateSettings, Spread, check_scene};
 pub use train::TrainSettings;
@@ -41,6 +43,9 @@ use std::str::FromStr;
 pub struct Pipeline {
     /// The task.
     pub task: Task,
+    /// Who does it: `jaco`, `panda`, `ur5e`, or the TOML file of a robot, relative to the pipeline file.
+    #[serde(default)]
+    pub robot: ChosenRobot,
     /// Where things stand.
     #[serde(default)]
     pub scene: SceneSettings,
@@ -116,6 +121,7 @@ impl Pipeline {
     pub fn defaults(task: Task) -> Self {
         Pipeline {
             task,
+            robot: ChosenRobot::default(),
             scene: SceneSettings::default(),
             plan: PlanSettings::default(),
             simulate: SimulateSettings::default(),
@@ -126,23 +132,31 @@ impl Pipeline {
         }
     }
 
-    /// The resolved settings as a TOML document: all of them, or those that `stage` reads.
+    /// The resolved settings as a TOML document: all of them, or those that `stage` reads (the paper's robot unsaid: it is there where none is named).
     ///
     /// # Errors
     /// [`Error::Failed`] when a value has no form in TOML.
     pub fn to_toml(&self, stage: Option<Stage>) -> Result<String> {
         let mut table = self.to_table()?;
-        table.retain(|key, _| key == "task" || stage.is_none_or(|stage| stage.sections().contains(&key)));
+        if stage.is_some() && self.robot.is_default() {
+            table.remove("robot");
+        }
+        table.retain(|key, _| ["task", "robot"].contains(&key) || stage.is_none_or(|stage| stage.sections().contains(&key)));
         toml::to_string(&table).map_err(|e| Error::Failed(format!("settings cannot be written as TOML: {e}")))
     }
 
-    /// The settings that `stage` reads, as they go into the provenance of what it writes.
+    /// The settings that `stage` reads, as they go into the provenance of what it writes; the robot by what it is, not by what its files are called, and the
+    /// paper's not at all, as in files from when there was no other.
     ///
     /// # Errors
     /// [`Error::Failed`] when a value has no form in JSON.
     pub fn to_json(&self, stage: Stage) -> Result<serde_json::Value> {
         let mut table = self.to_table()?;
         table.retain(|key, _| stage.sections().contains(&key));
+        if !self.robot.is_default() {
+            let robot = [("name", self.robot.name.clone()), ("content", self.robot.content())];
+            table.insert("robot".into(), toml::Table::from_iter(robot.map(|(key, value)| (key.into(), value.into()))).into());
+        }
         serde_json::to_value(table).map_err(|e| Error::Failed(format!("settings cannot be written as JSON: {e}")))
     }
 

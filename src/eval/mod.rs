@@ -100,7 +100,7 @@ impl<'a> Rollouts<'a> {
     /// # Errors
     /// See [`draw_scene`].
     pub fn scene(&self, index: u64) -> Result<Scene> {
-        draw_scene(self.pipeline.task, &self.pipeline.scene, &mut self.stream("scene", index))
+        draw_scene(&self.pipeline.robot, self.pipeline.task, &self.pipeline.scene, &mut self.stream("scene", index))
     }
 
     /// Runs all episodes, in parallel on the current thread pool; the result does not depend on the number of threads.
@@ -126,7 +126,7 @@ impl<'a> Rollouts<'a> {
                 interrupt.check()?;
                 let scene = self.scene(index)?;
                 let run = |mut controller: Box<dyn Controller>| {
-                    let mut disturbance = Disturbance::new(&settings, self.stream("noise", index));
+                    let mut disturbance = Disturbance::new(&scene.robot, &settings, self.stream("noise", index));
                     run_episode(index, &scene, controller.as_mut(), &mut disturbance, self.horizon_steps, interrupt)
                 };
                 let episode = make_controller(index, &scene)?.map(run).transpose()?;
@@ -156,7 +156,7 @@ fn unplanned(index: u64, scene: Scene) -> Trial {
 mod tests {
     use super::*;
     use crate::scene::Obstacle;
-    use crate::state::{Action, JOINTS};
+    use crate::state::Action;
     use crate::tasks::{Observation, Task};
 
     #[test]
@@ -177,7 +177,7 @@ mod tests {
 
     impl Controller for Constant {
         fn command(&mut self, _seen: &Observation) -> Action {
-            [self.0; JOINTS]
+            [self.0; 9].into()
         }
     }
 

@@ -28,6 +28,6 @@ impl Controller for PolicyController {
             Some(rng) => self.policy.sample(&row, rng),
             None => self.policy.act(&row),
         };
-        std::array::from_fn(|i| f64::from(action[i]))
+        action.iter().map(|v| f64::from(*v)).collect()
     }
 }

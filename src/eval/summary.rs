@@ -71,13 +71,21 @@ impl Summary {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::robot::file::built_in::paper_robot;
     use crate::scene::Scene;
     use crate::state::{Context, Pose};
 
     fn trial(index: u64, failure: Option<FailureClass>, steps: u64) -> Trial {
         let block = Pose::from_yaw([0.4, 0.0, 0.025], 0.0);
-        let scene =
-            Scene { task: Task::PickUp, block, context: Context::None, obstacles: vec![], friction: 1.0, block_mass_kg: 0.1 };
+        let scene = Scene {
+            robot: paper_robot(),
+            task: Task::PickUp,
+            block,
+            context: Context::None,
+            obstacles: vec![],
+            friction: 1.0,
+            block_mass_kg: 0.1,
+        };
         let conditions = vec![true, true, failure.is_none(), failure.is_none(), failure.is_none()];
         Trial { index, scene, success: failure.is_none(), failure, steps, reward: 0.0, conditions, hit_obstacle: false }
     }

@@ -105,9 +105,9 @@ fn stage_settings(
     let episodes = experiment.episodes.map(|n| format!("evaluate.episodes={n}"));
     let sets: Vec<String> = experiment.set.iter().chain(&episodes).chain(own).cloned().collect();
     let pipeline = Pipeline::load(source, &sets)?;
-    check_ready_pose(&pipeline.scene)?;
+    check_ready_pose(&pipeline.robot, &pipeline.scene)?;
     // What another stage reads changes nothing here.
-    let read = sets.iter().filter(|set| stage.sections().contains(&section_of(set)));
+    let read = sets.iter().filter(|set| section_of(set) == "robot" || stage.sections().contains(&section_of(set)));
     let words = words.iter().cloned().chain(read.flat_map(|set| ["--set".to_string(), set.clone()])).collect();
     Ok(StageSettings { words, json: pipeline.to_json(stage)?, pipeline })
 }

@@ -28,6 +28,10 @@ impl Layout {
         if !limits.is_empty() && (limits.len() != dim || !limits.iter().all(|v| *v > 0.0 && v.is_finite())) {
             return Err(format!("{} limits of actions of {dim} entries: one above 0 for each is needed, or none", limits.len()));
         }
+        let units = &self.action_units;
+        if !units.is_empty() && (units.len() != dim || !units.iter().all(|v| v.is_finite() && v.abs() > 0.0)) {
+            return Err(format!("{} units of actions of {dim} entries: one for each is needed, or none", units.len()));
+        }
         self.check_arm()?;
         self.check_aims()
     }
@@ -124,6 +128,7 @@ mod tests {
             ],
             action: vec![span("arm", Holds::ArmVelocities, 2), span("finger", Holds::FingerVelocities, 1)],
             action_limits: vec![1.0; 3],
+            action_units: Vec::new(),
             aims: vec![Aim { object: "block".into(), target: "goal".into(), offset_m: [0.0; 3] }],
             arm: Some(Chain { joints: vec![still; 2], tool_m: [0.0; 3] }),
         }

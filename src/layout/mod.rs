@@ -33,6 +33,10 @@ pub struct Layout {
     pub action: Vec<Span>,
     /// Largest value of each entry of an action, in its unit; empty where it is not known.
     pub action_limits: Vec<f64>,
+    /// What counts for each entry of an action as a radian a second does: other joints than those that turn have other scales. Negative where a
+    /// negative command closes a finger. Empty where it is 1 for all.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub action_units: Vec<f64>,
     /// Where objects are to go.
     pub aims: Vec<Aim>,
     /// The arm that carries the tool, where it is known. Its joints are the first of the joint positions.
@@ -166,6 +170,22 @@ impl Layout {
     /// The entries of an action that drive the fingers; empty when none are known to.
     pub fn fingers(&self) -> Range<usize> {
         first(&self.action, Holds::FingerVelocities)
+    }
+
+    /// What counts for entry `i` of an action as a radian a second does, without its sign.
+    pub fn action_unit(&self, i: usize) -> f32 {
+        self.closing_unit(i).abs()
+    }
+
+    /// The same with its sign: a command above 0 times it closes a finger.
+    pub fn closing_unit(&self, i: usize) -> f32 {
+        self.action_units.get(i).map_or(1.0, |unit| *unit as f32)
+    }
+
+    /// What counts for entry `i` of a state as a radian, a radian a second or a metre does.
+    pub fn state_unit(&self, i: usize) -> f32 {
+        let joint = [self.positions(), self.velocities()].into_iter().find(|joints| joints.contains(&i));
+        joint.map_or(1.0, |joints| self.action_unit(i - joints.start))
     }
 
     /// Objects that may move, each with its first entry.

@@ -1,8 +1,10 @@
 //! Blocks of episodes: what planning has finished, plans and drops alike, as a table and back.
 
 use super::{Plan, from_table, to_table};
+use crate::robot::Robot;
 use crate::table::{Table, Values};
 use std::ops::Range;
+use std::sync::Arc;
 
 /// Episodes of a block. Few enough that little is lost when planning is stopped (some tenths of a second of work; minutes of the hardest
 /// scenes), enough that a table whose row groups are blocks packs well: some 10,000 rows.
@@ -45,7 +47,7 @@ impl Block {
 pub type Planned = Vec<(u64, Result<Plan, String>)>;
 
 /// As a table: the rows of [`to_table`] with a column `dropped`; behind them a row for each episode without a plan, with the reason there.
-pub fn block_to_table(planned: Planned) -> Table {
+pub fn block_to_table(robot: &Robot, planned: Planned) -> Table {
     let (mut plans, mut numbers, mut reasons) = (Vec::new(), Vec::new(), Vec::new());
     for (number, planned) in planned {
         match planned {
@@ -56,7 +58,7 @@ pub fn block_to_table(planned: Planned) -> Table {
             }
         }
     }
-    let mut table = to_table(&plans);
+    let mut table = to_table(robot, &plans);
     let waypoints = table.rows();
     let rows = waypoints + reasons.len();
     for column in &mut table.columns {
@@ -72,11 +74,11 @@ pub fn block_to_table(planned: Planned) -> Table {
     table.with(DROPPED, "Why the episode has no plan, empty on the rows of plans.", Values::Text(dropped))
 }
 
-/// The inverse of [`block_to_table`], by number.
+/// The inverse of [`block_to_table`], of plans of `robot`, by number.
 ///
 /// # Errors
 /// As [`from_table`]; when the episodes are not those of `block`.
-pub fn block_from_table(block: Block, mut table: Table) -> Result<Planned, String> {
+pub fn block_from_table(robot: &Arc<Robot>, block: Block, mut table: Table) -> Result<Planned, String> {
     let Some(Values::Text(dropped)) = table.columns.pop().filter(|c| c.name == DROPPED).map(|c| c.values) else {
         return Err(format!("its last column is not {DROPPED}: this is no block of plans"));
     };
@@ -93,7 +95,7 @@ pub fn block_from_table(block: Block, mut table: Table) -> Result<Planned, Strin
         }
     }
     let drops = numbers.into_iter().map(|number| number as u64).zip(dropped.into_iter().skip(waypoints).map(Err));
-    let mut planned: Planned = from_table(&table)?.into_iter().map(|plan| (plan.index, Ok(plan))).chain(drops).collect();
+    let mut planned: Planned = from_table(robot, &table)?.into_iter().map(|plan| (plan.index, Ok(plan))).chain(drops).collect();
     planned.sort_by_key(|(number, _)| *number);
     if planned.iter().map(|(number, _)| *number).eq(block.episodes()) {
         return Ok(planned);
@@ -106,6 +108,7 @@ mod tests {
     use super::*;
     use crate::config::{PlanSettings, SceneSettings};
     use crate::plan::Planner;
+    use crate::robot::file::built_in::paper_robot;
     use crate::seed::stream;
     use crate::tasks::{Task, draw_scene};
 
@@ -120,9 +123,9 @@ mod tests {
     #[test]
     fn a_table_holds_a_block_exactly_and_another_block_is_refused() {
         let scenes = SceneSettings::default();
-        let mut planner = Planner::new(&PlanSettings::default());
+        let mut planner = Planner::new(&paper_robot(), &PlanSettings::default());
         let mut plan = |index| {
-            let scene = draw_scene(Task::PickUp, &scenes, &mut stream(0, "scene", index)).expect("there is room");
+            let scene = draw_scene(&paper_robot(), Task::PickUp, &scenes, &mut stream(0, "scene", index)).expect("there is room");
             planner.plan(index, &scene, &mut stream(0, "search", index)).map_err(|e| e.to_string())
         };
         let block = Block::all(3).next().expect("a block");
@@ -130,10 +133,10 @@ mod tests {
         let none: Planned = (0..3).map(|number| (number, Err(format!("episode {number}")))).collect();
         let all: Planned = (0..3).map(|number| (number, plan(number))).collect();
         for planned in [mixed, none, all] {
-            let table = block_to_table(planned.clone());
-            assert_eq!(block_from_table(block, table.clone()), Ok(planned));
+            let table = block_to_table(&paper_robot(), planned.clone());
+            assert_eq!(block_from_table(&paper_robot(), block, table.clone()), Ok(planned));
             let other = Block::all(2).next().expect("a block");
-            assert!(block_from_table(other, table).expect_err("one more").contains("not 0 to 1"));
+            assert!(block_from_table(&paper_robot(), other, table).expect_err("one more").contains("not 0 to 1"));
         }
     }
 }

@@ -1,9 +1,12 @@
 //! Where the hand goes: ready pose, grasp and release candidates, and the heights between them.
 
 use super::path::{Knot, YAW_LEVER_M, knot};
-use crate::robot::{Arm, READY_Q_RAD};
-use crate::scene::Scene;
+use crate::joints::Joints;
+use crate::robot::Robot;
+use crate::robot::collision::Solid;
+use crate::scene::{BLOCK_EDGE_M, Scene};
 use crate::state::Context;
+use nalgebra::Translation3;
 use std::f64::consts::FRAC_PI_2;
 
 /// Height of the tool point over the block's centre in a grasp \[m\]: closed fingertips stay 5 mm above the table.
@@ -18,6 +21,10 @@ pub(super) const CARRY_RISE_M: f64 = 0.08;
 pub const RELEASE_GAP_M: f64 = 0.002;
 /// How far the hand retreats upward \[m\].
 pub(super) const RETREAT_RISE_M: f64 = 0.09;
+/// How deep a finger that holds a block is in it, in numbers \[m\]: within the millimetre that contacts of the simulation give way.
+const PRESS_M: f64 = 5e-4;
+/// Halvings of the way on which a closing finger meets the block: a hundredth of a degree is left.
+const CLOSING_ROUNDS: usize = 14;
 /// Quarter turns at which a cube can be held, in order of preference.
 const QUARTER_TURNS: [f64; 4] = [0.0, 1.0, -1.0, 2.0];
 
@@ -27,8 +34,8 @@ pub(super) fn raised(at: &Knot, by_m: f64) -> Knot {
 }
 
 /// Where every plan begins.
-pub(super) fn ready() -> Knot {
-    let tool = Arm::new().tool_pose(&READY_Q_RAD);
+pub(super) fn ready(robot: &Robot) -> Knot {
+    let tool = robot.tool_pose(&robot.ready);
     knot(tool.translation.vector.into(), 0.0)
 }
 
@@ -52,7 +59,57 @@ pub(super) fn releases(scene: &Scene, grasp: &Knot) -> Vec<Knot> {
     QUARTER_TURNS.map(|k| knot([x, y, z + GRASP_OVER_CENTER_M + RELEASE_GAP_M], yaw + k * FRAC_PI_2)).to_vec()
 }
 
+/// The hand in the ready pose, each finger closed as far as a block between them lets it, to a hundredth of a radian.
+pub(super) fn closed_on_block(robot: &Robot) -> Joints {
+    let mut closed = robot.ready;
+    for (i, joint) in robot.fingers().enumerate() {
+        let at = |share: f64| {
+            let mut q = robot.ready;
+            q[joint] += share * robot.closing_way(i);
+            q
+        };
+        let (mut low, mut high) = (0.0, 1.0);
+        for _ in 0..CLOSING_ROUNDS {
+            let share = (low + high) / 2.0;
+            if presses_block(robot, joint + 1, &at(share)) { high = share } else { low = share }
+        }
+        let hundredths = at(low)[joint] / robot.joints[joint].per_radian() * 100.0;
+        let whole = if robot.closing_way(i) > 0.0 { hundredths.floor() } else { hundredths.ceil() };
+        closed[joint] = whole / 100.0 * robot.joints[joint].per_radian();
+    }
+    closed
+}
+
+/// Whether a link presses into a block that stands as it is grasped.
+fn presses_block(robot: &Robot, link: usize, q: &Joints) -> bool {
+    let poses = robot.link_poses(q);
+    let center = robot.tool_of(&poses) * Translation3::new(0.0, 0.0, -GRASP_OVER_CENTER_M);
+    let block = Solid::cuboid(center, [BLOCK_EDGE_M / 2.0; 3]);
+    robot.links[link].shapes.iter().any(|shape| Solid::of(shape, &poses[link]).distance_m(&block) < -PRESS_M)
+}
+
 /// The least turn that looks the same for a cube, within an eighth of a turn to either side.
 fn quarter_turn(yaw: f64) -> f64 {
     yaw - (yaw / FRAC_PI_2).round() * FRAC_PI_2
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::robot::file::built_in::{all, paper_robot};
+
+    #[test]
+    fn fingers_close_as_far_as_the_block_lets_them() {
+        // As measured: a cube of 5 cm stops them at .98 to 1.01 rad.
+        assert_eq!(closed_on_block(&paper_robot())[6], 0.98);
+        for robot in all() {
+            let closed = closed_on_block(&robot);
+            for (i, joint) in robot.fingers().enumerate() {
+                let mut farther = closed;
+                farther[joint] += 0.02 * robot.joints[joint].per_radian() * robot.closing_way(i).signum();
+                let presses = |q: &Joints| presses_block(&robot, joint + 1, q);
+                assert!(!presses(&closed) && presses(&farther), "{}: {closed:?}", robot.name);
+            }
+        }
+    }
 }

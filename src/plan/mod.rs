@@ -22,20 +22,18 @@ pub use table::{Plans, from_table, to_table};
 pub use world::{CLEARANCE_M, RESOLUTION_M, check_ready_pose};
 
 use crate::demo::Phase;
+use crate::joints::Joints;
 use crate::scene::Scene;
-use crate::state::JOINTS;
 
-/// Finger angle of the closed hand in a plan \[rad\]: a 5 cm cube stops the fingers at .98 to 1.01.
-pub const CLOSED_RAD: f64 = 0.98;
 /// One sample of a plan.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Waypoint {
     /// Which part of the plan this is.
     pub phase: Phase,
-    /// Joint angles \[rad\].
-    pub q_rad: [f64; JOINTS],
-    /// Velocity that leads to the next sample in one control step \[rad/s\]; zero on the last sample of each phase, where the arm rests.
-    pub dq_rad_s: [f64; JOINTS],
+    /// Joint positions \[rad, m\].
+    pub q: Joints,
+    /// Velocity that leads to the next sample in one control step \[rad/s, m/s\]; zero on the last sample of each phase, where the arm rests.
+    pub dq: Joints,
 }
 
 /// One planned demonstration, sampled at [`crate::state::CONTROL_HZ`]. Phases come in the order of [`Phase::ALL`]; a pick-up ends with

@@ -1,7 +1,7 @@
 //! Hand paths: straight lines with rounded corners, hand level, turned into joint angles by inverse kinematics.
 
+use crate::joints::Joints;
 use crate::robot::{Ik, Unreachable};
-use crate::state::JOINTS;
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector4};
 
 /// A level pose of the hand: tool point x y z \[m\], then yaw times [`YAW_LEVER_M`] \[m\], so that lengths and corners mean something.
@@ -69,18 +69,13 @@ pub(super) fn resample(line: &[Knot]) -> Vec<Knot> {
 ///
 /// # Errors
 /// The first sample that cannot be reached.
-pub(super) fn follow(
-    ik: &mut Ik,
-    knots: &[Knot],
-    corner_m: f64,
-    start: &[f64; JOINTS],
-) -> Result<Vec<[f64; JOINTS]>, Unreachable> {
+pub(super) fn follow(ik: &mut Ik, knots: &[Knot], corner_m: f64, start: &Joints) -> Result<Vec<Joints>, Unreachable> {
     let samples = resample(&round_corners(knots, corner_m));
     let mut q = Vec::with_capacity(samples.len());
     q.push(*start);
     for sample in &samples[1..] {
         let seed = match q[..] {
-            [.., before, last] => std::array::from_fn(|i| 2.0 * last[i] - before[i]),
+            [.., before, last] => Joints::from_fn(last.len(), |i| 2.0 * last[i] - before[i]),
             _ => *start,
         };
         q.push(ik.solve(&tool_pose(sample), &seed)?);

@@ -1,21 +1,23 @@
 //! The planner: one attempt after another, each a grasp, its approach, and what follows.
 
-use super::grasp::{CARRY_RISE_M, LIFTED_CENTER_M, PREGRASP_RISE_M, RETREAT_RISE_M, grasps, raised, ready, releases};
+use super::grasp::{
+    CARRY_RISE_M, LIFTED_CENTER_M, PREGRASP_RISE_M, RETREAT_RISE_M, closed_on_block, grasps, raised, ready, releases,
+};
 use super::path::{Knot, tool_pose};
 use super::smooth::Limits;
 use super::transit::{Leg, Motions, smooth_path};
 use super::world::{Block, PATH_CLEARANCES_M, World};
-use super::{CLOSED_RAD, Plan, PlanError, Waypoint};
+use super::{Plan, PlanError, Waypoint};
 use crate::config::PlanSettings;
 use crate::demo::Phase;
 use crate::interrupt::Interrupt;
-use crate::robot::file::built_in;
-use crate::robot::jaco::PRESHAPE_RAD;
-use crate::robot::{Ik, READY_Q_RAD};
+use crate::joints::Joints;
+use crate::robot::{Ik, Robot};
 use crate::scene::Scene;
-use crate::state::{ARM_JOINTS, CONTROL_DT_S, Context, JOINTS};
+use crate::state::{CONTROL_DT_S, Context};
 use nalgebra::Isometry3;
 use rand::Rng;
+use std::sync::Arc;
 
 /// Pieces of the fingers' way, fine enough for its short acceleration.
 const FINGER_SAMPLES: usize = 10;
@@ -24,16 +26,17 @@ const FINGER_SAMPLES: usize = 10;
 pub struct Planner {
     motions: Motions,
     /// See [`closing`].
-    closing: Vec<f64>,
+    closing: Vec<Joints>,
 }
 
 impl Planner {
-    /// A planner with these settings.
-    pub fn new(settings: &PlanSettings) -> Self {
-        let limits = Limits::new(settings);
+    /// A planner for this robot with these settings.
+    pub fn new(robot: &Arc<Robot>, settings: &PlanSettings) -> Self {
+        let limits = Limits::new(robot, settings);
         let interrupt = Interrupt::default();
-        let closing = closing(&limits, &interrupt);
-        Planner { motions: Motions { settings: settings.clone(), limits, ik: Ik::new(&built_in::jaco()), interrupt }, closing }
+        let closing = closing(robot, &limits, &interrupt);
+        let (robot, ik) = (Arc::clone(robot), Ik::new(robot));
+        Planner { motions: Motions { robot, settings: settings.clone(), limits, ik, interrupt }, closing }
     }
 
     /// Lets Ctrl-C end the planning of a scene: a plan that was on its way is an error then.
@@ -44,7 +47,7 @@ impl Planner {
     /// Plans one demonstration of `scene`; `index` goes into the plan, `rng` is used only where a search is needed.
     ///
     /// # Errors
-    /// [`PlanError`]: which stage failed, and why; of several grasps, the one that came farthest.
+    /// [`PlanError`]: which stage failed, and why; of several grasps, the one that came farthest, and of those the preferred one.
     pub fn plan(&mut self, index: u64, scene: &Scene, rng: &mut impl Rng) -> Result<Plan, PlanError> {
         let world = World::new(scene);
         let mut farthest: Option<PlanError> = None;
@@ -52,7 +55,7 @@ impl Planner {
             for grasp in grasps(scene) {
                 match self.with_grasp(&Try { scene, world: &world, grasp, margin_m }, rng) {
                     Ok(pieces) => return Ok(Plan { index, scene: scene.clone(), waypoints: waypoints(&pieces) }),
-                    Err(error) if farthest.as_ref().is_none_or(|f| error.progress() >= f.progress()) => farthest = Some(error),
+                    Err(error) if farthest.as_ref().is_none_or(|f| error.progress() > f.progress()) => farthest = Some(error),
                     Err(_) => {}
                 }
                 if self.motions.interrupt.is_raised() {
@@ -86,12 +89,13 @@ impl Planner {
     fn approach(&mut self, with: &Try, rng: &mut impl Rng) -> Result<Vec<Piece>, PlanError> {
         let (block, grasp) = (Block::Free(with.scene.block.isometry()), with.grasp);
         let above = raised(&grasp, PREGRASP_RISE_M);
-        let q_above = self.motions.reach(&above, &READY_Q_RAD, "above the block")?;
+        let start = self.motions.robot.ready;
+        let q_above = self.motions.reach(&above, &start, "above the block")?;
         let q = self.motions.reach(&grasp, &q_above, "at the block")?;
         with.world
             .check(&q, &block, with.margin_m)
             .map_err(|why| PlanError::Grasp(format!("with the open hand around the block, {why}")))?;
-        let (from, start) = (ready(), READY_Q_RAD);
+        let from = ready(&self.motions.robot);
         let leg = Leg {
             phase: Phase::Approach,
             before: Vec::new(),
@@ -103,7 +107,7 @@ impl Planner {
             start,
         };
         let q = self.motions.transit(with.world, &leg, rng)?;
-        let closing = Self::fingers(Phase::Close, &self.closing, &q[q.len() - 1]);
+        let closing = self.fingers(Phase::Close, self.closing.iter(), &q[q.len() - 1]);
         Ok(vec![Piece { phase: Phase::Approach, q }, closing])
     }
 
@@ -125,35 +129,33 @@ impl Planner {
         let placed = Block::Free(tool_pose(release) * with.in_tool());
         let at_target = |why| PlanError::Grasp(format!("with the block at its target, {why}"));
         with.world.check(&q, &block, with.margin_m).map_err(at_target)?;
-        q[ARM_JOINTS..].fill(PRESHAPE_RAD);
+        let robot = &self.motions.robot;
+        q[robot.arm..].copy_from_slice(&robot.ready[robot.arm..]);
         with.world.check(&q, &placed, with.margin_m).map_err(at_target)?;
         let (before, after) = (vec![grasp], vec![*release]);
         let leg = Leg { phase: Phase::Carry, before, from, to, after, block, margin_m: with.margin_m, start };
         pieces.push(Piece { phase: Phase::Carry, q: self.motions.transit(with.world, &leg, rng)? });
-        let opening: Vec<f64> = self.closing.iter().rev().copied().collect();
-        pieces.push(Self::fingers(Phase::Open, &opening, &end_of(&pieces)));
+        pieces.push(self.fingers(Phase::Open, self.closing.iter().rev(), &end_of(&pieces)));
         let leg = with.straight_up(Phase::Retreat, *release, raised(release, RETREAT_RISE_M), placed, end_of(&pieces));
         pieces.push(Piece { phase: Phase::Retreat, q: self.motions.transit(with.world, &leg, rng)? });
         Ok(pieces)
     }
 
-    /// Fingers follow `angles`, the arm still.
-    fn fingers(phase: Phase, angles: &[f64], arm: &[f64; JOINTS]) -> Piece {
-        let at = |angle: &f64| std::array::from_fn(|j| if j < ARM_JOINTS { arm[j] } else { *angle });
-        Piece { phase, q: angles.iter().map(at).collect() }
+    /// The fingers as in `samples`, the arm still.
+    fn fingers<'a>(&self, phase: Phase, samples: impl Iterator<Item = &'a Joints>, arm: &Joints) -> Piece {
+        let joints = self.motions.robot.arm;
+        let at = |sample: &Joints| Joints::from_fn(sample.len(), |j| if j < joints { arm[j] } else { sample[j] });
+        Piece { phase, q: samples.map(at).collect() }
     }
 }
 
-/// Angles of a finger that closes from the open hand, at the control rate \[rad\]; backwards, it opens.
-fn closing(limits: &Limits, interrupt: &Interrupt) -> Vec<f64> {
-    let path: Vec<[f64; JOINTS]> = (0..=FINGER_SAMPLES)
-        .map(|k| {
-            let angle = PRESHAPE_RAD + (CLOSED_RAD - PRESHAPE_RAD) * k as f64 / FINGER_SAMPLES as f64;
-            std::array::from_fn(|j| if j < ARM_JOINTS { READY_Q_RAD[j] } else { angle })
-        })
-        .collect();
-    let samples = smooth_path(&path, limits, interrupt).expect("the fingers' limits are constants that leave room");
-    samples.iter().map(|q| q[ARM_JOINTS]).collect()
+/// The hand that closes around a block, from open, in the ready pose, at the control rate; backwards, it opens.
+fn closing(robot: &Robot, limits: &Limits, interrupt: &Interrupt) -> Vec<Joints> {
+    let (open, closed) = (robot.ready, closed_on_block(robot));
+    let at = |k: usize| Joints::from_fn(open.len(), |j| open[j] + (closed[j] - open[j]) * k as f64 / FINGER_SAMPLES as f64);
+    let path: Vec<Joints> = (0..=FINGER_SAMPLES).map(at).collect();
+    // Where even that fails, the fingers jump in the plan; the follower drives them by speed in any case.
+    smooth_path(&path, limits, interrupt).unwrap_or(vec![open, closed])
 }
 
 /// One attempt: a scene, a grasp, and the distance to keep.
@@ -171,7 +173,7 @@ impl Try<'_> {
     }
 
     /// A straight motion with nothing fixed before or behind it.
-    fn straight_up(&self, phase: Phase, from: Knot, to: Knot, block: Block, start: [f64; JOINTS]) -> Leg {
+    fn straight_up(&self, phase: Phase, from: Knot, to: Knot, block: Block, start: Joints) -> Leg {
         Leg { phase, before: Vec::new(), from, to, after: Vec::new(), block, margin_m: self.margin_m, start }
     }
 }
@@ -180,11 +182,11 @@ impl Try<'_> {
 #[derive(Clone, Debug)]
 struct Piece {
     phase: Phase,
-    q: Vec<[f64; JOINTS]>,
+    q: Vec<Joints>,
 }
 
 /// Where the last piece ends.
-fn end_of(pieces: &[Piece]) -> [f64; JOINTS] {
+fn end_of(pieces: &[Piece]) -> Joints {
     let q = &pieces[pieces.len() - 1].q;
     q[q.len() - 1]
 }
@@ -195,8 +197,8 @@ fn waypoints(pieces: &[Piece]) -> Vec<Waypoint> {
     for (number, piece) in pieces.iter().enumerate() {
         for (k, q) in piece.q.iter().enumerate().skip(usize::from(number > 0)) {
             let next = piece.q.get(k + 1).unwrap_or(q);
-            let dq_rad_s = std::array::from_fn(|j| (next[j] - q[j]) / CONTROL_DT_S);
-            waypoints.push(Waypoint { phase: piece.phase, q_rad: *q, dq_rad_s });
+            let dq = Joints::from_fn(q.len(), |j| (next[j] - q[j]) / CONTROL_DT_S);
+            waypoints.push(Waypoint { phase: piece.phase, q: *q, dq });
         }
     }
     waypoints

@@ -4,8 +4,8 @@
 use super::path::{Knot, tool_pose};
 use super::world::{Block, World};
 use crate::interrupt::Interrupt;
+use crate::joints::Joints;
 use crate::robot::Ik;
-use crate::state::JOINTS;
 use rand::{Rng, RngExt};
 
 /// Length of a step of the trees \[m\].
@@ -19,7 +19,7 @@ const REACH_Z_M: f64 = 0.45;
 #[derive(Clone, Copy)]
 struct Node {
     knot: Knot,
-    q: [f64; JOINTS],
+    q: Joints,
     parent: usize,
 }
 
@@ -37,12 +37,7 @@ pub(super) struct Search<'a> {
 
 impl Search<'_> {
     /// Knots of a free path between two ends, each with its joint angles; `None` when the iterations are spent, or on an interrupt.
-    pub(super) fn connect(
-        &mut self,
-        from: (Knot, [f64; JOINTS]),
-        to: (Knot, [f64; JOINTS]),
-        rng: &mut impl Rng,
-    ) -> Option<Vec<Knot>> {
+    pub(super) fn connect(&mut self, from: (Knot, Joints), to: (Knot, Joints), rng: &mut impl Rng) -> Option<Vec<Knot>> {
         let mut trees = [from, to].map(|(knot, q)| vec![Node { knot, q, parent: 0 }]);
         let low_z = from.0.z.min(to.0.z);
         for round in 0..self.iterations {

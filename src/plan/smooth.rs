@@ -6,17 +6,16 @@
 
 use crate::config::PlanSettings;
 use crate::interrupt::Interrupt;
-use crate::robot::{POSITION_LIMITS_RAD, VELOCITY_LIMITS_RAD_S};
-use crate::state::{ARM_JOINTS, CONTROL_DT_S, JOINTS};
+use crate::joints::Joints;
+use crate::robot::Robot;
+use crate::state::CONTROL_DT_S;
 use clarabel::algebra::CscMatrix;
 use clarabel::solver::{DefaultSettings, DefaultSolver, IPSolver, SolverStatus, SupportedConeT};
 
 /// Bends quicker than this are rounded off \[s\]: the weight of squared jerk is (this / dt)^6.
 const SMOOTHING_TIME_S: f64 = 0.10;
-/// Speed of the fingers in a plan \[rad/s\] (measured: closes on a block without pushing it).
-const FINGER_SPEED_RAD_S: f64 = 0.8;
-/// Acceleration of the fingers \[rad/s^2\]: they are light, and reach their speed within two control steps.
-const FINGER_ACCELERATION_RAD_S2: f64 = 8.0;
+/// Time in which the fingers reach their speed \[s\], two control steps: they are light.
+const FINGER_START_S: f64 = 2.0 * CONTROL_DT_S;
 /// Share of the limits that the program may use, so that its solution holds them in spite of rounding.
 const TIGHT: f64 = 1.0 - 1e-5;
 /// A joint that moves less than this over a piece keeps its place \[rad\].
@@ -30,48 +29,60 @@ const NEAR_LIMIT_RAD: f64 = 0.1;
 /// Third difference.
 const JERK: [f64; 4] = [-1.0, 3.0, -3.0, 1.0];
 
-type Q = [f64; JOINTS];
-
 /// What a plan may use of each joint.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Limits {
-    /// \[rad/s\].
-    pub velocity_rad_s: [f64; JOINTS],
-    /// \[rad/s^2\].
-    pub acceleration_rad_s2: [f64; JOINTS],
+    /// Lowest and highest \[rad, m\].
+    pub position: Vec<[f64; 2]>,
+    /// \[rad/s, m/s\].
+    pub velocity: Joints,
+    /// \[rad/s^2, m/s^2\].
+    pub acceleration: Joints,
+    /// What counts as a radian of each joint \[1, m/rad\]: the program's tolerances are meant for radians.
+    pub unit: Joints,
 }
 
 impl Limits {
     /// From the settings: a fraction of the arm's velocity limits and one acceleration; the fingers have their own.
-    pub fn new(settings: &PlanSettings) -> Self {
-        let arm = |j: usize| j < ARM_JOINTS;
+    pub fn new(robot: &Robot, settings: &PlanSettings) -> Self {
+        let each = |arm: &dyn Fn(usize) -> f64, finger: f64| {
+            Joints::from_fn(robot.joints.len(), |j| if j < robot.arm { arm(j) } else { finger })
+        };
         Limits {
-            velocity_rad_s: std::array::from_fn(|j| {
-                if arm(j) { settings.speed * VELOCITY_LIMITS_RAD_S[j] } else { FINGER_SPEED_RAD_S }
-            }),
-            acceleration_rad_s2: std::array::from_fn(|j| {
-                if arm(j) { settings.max_acceleration_rad_s2 } else { FINGER_ACCELERATION_RAD_S2 }
-            }),
+            position: robot.joints.iter().map(|joint| joint.limits).collect(),
+            velocity: each(&|j| settings.speed * robot.joints[j].velocity, robot.finger_speed),
+            acceleration: each(&|_| settings.max_acceleration_rad_s2, robot.finger_speed / FINGER_START_S),
+            unit: robot.joints.iter().map(|joint| joint.per_radian()).collect(),
         }
+    }
+
+    #[cfg(test)]
+    pub(super) fn alike(joints: usize, velocity: f64, acceleration: f64) -> Self {
+        let all = |value: f64| Joints::from_fn(joints, |_| value);
+        let position = vec![[0.0, 1.51]; joints];
+        Limits { position, velocity: all(velocity), acceleration: all(acceleration), unit: all(1.0) }
     }
 }
 
 /// Smooths samples that are one control step apart; `None` when no trajectory of this duration holds the limits, or on an interrupt.
-pub(super) fn smooth(samples: &[Q], limits: &Limits, interrupt: &Interrupt) -> Option<Vec<Q>> {
+pub(super) fn smooth(samples: &[Joints], limits: &Limits, interrupt: &Interrupt) -> Option<Vec<Joints>> {
     let mut smoothed = samples.to_vec();
     let last = samples.len() - 1;
     if last < 2 {
         return Some(smoothed);
     }
-    let near_limit = (0..JOINTS).any(|j| {
-        let [low, high] = POSITION_LIMITS_RAD[j];
-        samples.iter().any(|q| q[j] < low + NEAR_LIMIT_RAD || q[j] > high - NEAR_LIMIT_RAD)
+    let path = |j: usize| samples.iter().map(|q| q[j] / limits.unit[j]).collect::<Vec<f64>>();
+    let still = |path: &[f64]| path.iter().all(|q| (q - path[0]).abs() < STILL_RAD);
+    let near_limit = (0..samples[0].len()).any(|j| {
+        let [low, high] = limits.position[j].map(|limit| limit / limits.unit[j]);
+        let path = path(j);
+        !still(&path) && path.iter().any(|q| *q < low + NEAR_LIMIT_RAD || *q > high - NEAR_LIMIT_RAD)
     });
     let mut program = None;
-    for j in 0..JOINTS {
+    for j in 0..samples[0].len() {
         interrupt.check().ok()?;
-        let path: Vec<f64> = samples.iter().map(|q| q[j]).collect();
-        if path.iter().all(|q| (q - path[0]).abs() < STILL_RAD) {
+        let path = path(j);
+        if still(&path) {
             continue;
         }
         let (slope, bounds) = (slope(&path), bounds(&path, j, limits, near_limit));
@@ -89,7 +100,7 @@ pub(super) fn smooth(samples: &[Q], limits: &Limits, interrupt: &Interrupt) -> O
         if !matches!(solver.solution.status, SolverStatus::Solved | SolverStatus::AlmostSolved) {
             return None;
         }
-        solver.solution.x.iter().zip(&mut smoothed[1..last]).for_each(|(x, q)| q[j] += x);
+        solver.solution.x.iter().zip(&mut smoothed[1..last]).for_each(|(x, q)| q[j] += x * limits.unit[j]);
     }
     Some(smoothed)
 }
@@ -123,9 +134,10 @@ fn slope(path: &[f64]) -> Vec<f64> {
 /// Right-hand sides, in the order of the rows of [`build`]: room above, then room below, for velocity, acceleration and (if asked) position.
 fn bounds(path: &[f64], j: usize, limits: &Limits, near_limit: bool) -> Vec<f64> {
     let last = path.len() as isize - 1;
-    let step = TIGHT * limits.velocity_rad_s[j] * CONTROL_DT_S;
-    let bend = TIGHT * limits.acceleration_rad_s2[j] * CONTROL_DT_S.powi(2);
-    let [low, high] = POSITION_LIMITS_RAD[j];
+    let unit = limits.unit[j];
+    let step = TIGHT * (limits.velocity[j] / unit) * CONTROL_DT_S;
+    let bend = TIGHT * (limits.acceleration[j] / unit) * CONTROL_DT_S.powi(2);
+    let [low, high] = limits.position[j].map(|limit| limit / unit);
     let mut room: Vec<[f64; 2]> = Vec::with_capacity(3 * path.len());
     // The sample at rest has velocity 0 (it ends the phase before), so the first moving one starts from there.
     let step_at = |k: isize| if k == 1 { step.min(bend) } else { step };
@@ -207,13 +219,13 @@ mod tests {
     use super::*;
 
     fn limits() -> Limits {
-        Limits { velocity_rad_s: [0.5; JOINTS], acceleration_rad_s2: [2.0; JOINTS] }
+        Limits::alike(9, 0.5, 2.0)
     }
 
     #[test]
     fn rounds_a_kink_off_within_the_limits_and_keeps_the_ends() {
         // Velocity jumps from 0 to 0.4 rad/s and back: far beyond the acceleration limit.
-        let samples: Vec<Q> = (0..60).map(|k: i32| [0.85 + 0.02 * f64::from((k - 15).clamp(0, 30)); JOINTS]).collect();
+        let samples: Vec<Joints> = (0..60).map(|k: i32| [0.85 + 0.02 * f64::from((k - 15).clamp(0, 30)); 9].into()).collect();
         let smoothed = smooth(&samples, &limits(), &Interrupt::default()).expect("there is time enough");
         assert_eq!((smoothed[0], smoothed[59]), (samples[0], samples[59]));
         for w in smoothed.windows(3) {
@@ -227,7 +239,7 @@ mod tests {
 
     #[test]
     fn says_when_the_time_is_too_short() {
-        let samples: Vec<Q> = (0..10).map(|k| [3.0 + 0.1 * f64::from(k); JOINTS]).collect();
+        let samples: Vec<Joints> = (0..10).map(|k| [0.1 + 0.1 * f64::from(k); 9].into()).collect();
         assert!(smooth(&samples, &limits(), &Interrupt::default()).is_none());
     }
 }

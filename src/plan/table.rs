@@ -4,15 +4,18 @@ use super::{Plan, Waypoint};
 use crate::config::{MOST_STEPS, check_scene};
 use crate::demo::{LARGEST_NUMBER, Phase};
 use crate::error::Error;
+use crate::joints::Joints;
+use crate::robot::Robot;
+use crate::robot::model::Joint;
 use crate::scene::Scene;
-use crate::state::{JOINT_NAMES, JOINTS};
 use crate::table::{Table, Values};
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
-/// Plans as a table, one row per waypoint: `episode`, `step`, `phase`, `<joint>.q_rad` and `<joint>.dq_rad_s` per joint, and `scene`, the scene
-/// as JSON on the first row of each episode (empty text on the others).
-pub fn to_table(plans: &[Plan]) -> Table {
+/// Plans of a robot as a table, one row per waypoint: `episode`, `step`, `phase`, `<joint>.q_rad` and `<joint>.dq_rad_s` per joint (`q_m`, `dq_m_s` of
+/// one that slides), and `scene`, the scene as JSON on the first row of each episode (empty text on the others).
+pub fn to_table(robot: &Robot, plans: &[Plan]) -> Table {
     let rows = || plans.iter().flat_map(|p| p.waypoints.iter().enumerate().map(move |(step, w)| (p, step, w)));
     let scene = |p: &Plan, step: usize| match step {
         0 => serde_json::to_string(&p.scene).expect("a scene is plain data with text keys"),
@@ -22,12 +25,13 @@ pub fn to_table(plans: &[Plan]) -> Table {
         .with("episode", "Episode number.", Values::I64(rows().map(|(p, ..)| p.index as i64).collect()))
         .with("step", "Control step within the episode, from 0.", Values::I64(rows().map(|(_, step, _)| step as i64).collect()))
         .with("phase", "Part of the plan.", Values::Text(rows().map(|(.., w)| w.phase.name().into()).collect()));
-    for (j, name) in JOINT_NAMES.iter().enumerate() {
-        table = table.with(&format!("{name}.q_rad"), "Joint angle.", Values::F64(rows().map(|(.., w)| w.q_rad[j]).collect()));
+    for (j, joint) in robot.joints.iter().enumerate() {
+        let position = Values::F64(rows().map(|(.., w)| w.q[j]).collect());
+        table = table.with(&joint.position_name(), "Joint angle.", position);
     }
-    for (j, name) in JOINT_NAMES.iter().enumerate() {
-        let velocity = rows().map(|(.., w)| w.dq_rad_s[j]).collect();
-        table = table.with(&format!("{name}.dq_rad_s"), "Joint velocity that leads to the next step.", Values::F64(velocity));
+    for (j, joint) in robot.joints.iter().enumerate() {
+        let velocity = Values::F64(rows().map(|(.., w)| w.dq[j]).collect());
+        table = table.with(&joint.velocity_name(), "Joint velocity that leads to the next step.", velocity);
     }
     table.with(
         "scene",
@@ -36,13 +40,13 @@ pub fn to_table(plans: &[Plan]) -> Table {
     )
 }
 
-/// The inverse of [`to_table`].
+/// The inverse of [`to_table`], of plans of `robot`.
 ///
 /// # Errors
 /// Says which column is missing or of another type, and in which row a number is not finite, a phase unknown, a scene unreadable, or the
 /// order of episodes, steps or phases broken.
-pub fn from_table(table: &Table) -> Result<Vec<Plan>, String> {
-    let mut rows = Rows::default();
+pub fn from_table(robot: &Arc<Robot>, table: &Table) -> Result<Vec<Plan>, String> {
+    let mut rows = Rows::new(robot);
     let mut plans = rows.take(table)?;
     plans.extend(rows.open);
     Ok(plans)
@@ -57,9 +61,9 @@ pub struct Plans<T> {
 }
 
 impl<T> Plans<T> {
-    /// Of the pieces of a table; errors speak of `path`.
-    pub fn new(path: &Path, tables: T) -> Self {
-        Plans { path: path.to_path_buf(), tables, rows: Rows::default(), ready: Vec::new().into_iter() }
+    /// Of the pieces of a table of plans of `robot`; errors speak of `path`.
+    pub fn new(path: &Path, robot: &Arc<Robot>, tables: T) -> Self {
+        Plans { path: path.to_path_buf(), tables, rows: Rows::new(robot), ready: Vec::new().into_iter() }
     }
 }
 
@@ -81,8 +85,8 @@ impl<T: Iterator<Item = crate::error::Result<Table>>> Iterator for Plans<T> {
 }
 
 /// What is known of the rows so far.
-#[derive(Default)]
 struct Rows {
+    robot: Arc<Robot>,
     count: usize,
     begun: HashSet<u64>,
     /// The plan of the last row, which may go on.
@@ -90,13 +94,19 @@ struct Rows {
 }
 
 impl Rows {
+    fn new(robot: &Arc<Robot>) -> Self {
+        Rows { robot: Arc::clone(robot), count: 0, begun: HashSet::new(), open: None }
+    }
+
     /// The plans that are known to end: all but the one of the last row.
     fn take(&mut self, table: &Table) -> Result<Vec<Plan>, String> {
         let (episodes, steps) = (integers(table, "episode")?, integers(table, "step")?);
         let (phases, scenes) = (texts(table, "phase")?, texts(table, "scene")?);
-        let joints =
-            |suffix: &str| JOINT_NAMES.iter().map(|j| floats(table, &format!("{j}.{suffix}"))).collect::<Result<Vec<_>, _>>();
-        let (q, dq) = (joints("q_rad")?, joints("dq_rad_s")?);
+        let robot = Arc::clone(&self.robot);
+        let columns = |name: fn(&Joint) -> String| {
+            robot.joints.iter().map(|joint| floats(table, &name(joint))).collect::<Result<Vec<_>, _>>()
+        };
+        let (q, dq) = (columns(Joint::position_name)?, columns(Joint::velocity_name)?);
         if let Some(c) = table.columns.iter().find(|c| c.values.len() != episodes.len()) {
             return Err(format!("column {} has {} rows, episode has {}", c.name, c.values.len(), episodes.len()));
         }
@@ -106,14 +116,14 @@ impl Rows {
             let phase = Phase::ALL.into_iter().find(|p| p.name() == phases[row]).ok_or_else(|| {
                 at(format!("unknown phase \"{}\"; allowed: {}", phases[row], Phase::ALL.map(Phase::name).join(", ")))
             })?;
-            let (q_rad, dq_rad_s) = (numbers(&q, row).map_err(at)?, numbers(&dq, row).map_err(at)?);
-            let waypoint = Waypoint { phase, q_rad, dq_rad_s };
+            let (q, dq) = (numbers(&robot, &q, row).map_err(at)?, numbers(&robot, &dq, row).map_err(at)?);
+            let waypoint = Waypoint { phase, q, dq };
             let index = u64::try_from(episodes[row]).map_err(|_| at(format!("episode {} is negative", episodes[row])))?;
             if steps[row] == 0 {
                 if !self.begun.insert(index) {
                     return Err(at(format!("episode {index} begins a second time")));
                 }
-                let scene = scene(&scenes[row]).map_err(at)?;
+                let scene = scene(&robot, &scenes[row]).map_err(at)?;
                 ended.extend(self.open.replace(Plan { index, scene, waypoints: vec![waypoint] }));
             } else {
                 go_on(self.open.as_mut(), index, steps[row], waypoint).map_err(at)?;
@@ -138,18 +148,20 @@ fn go_on(open: Option<&mut Plan>, index: u64, step: i64, waypoint: Waypoint) -> 
     Ok(())
 }
 
-fn scene(json: &str) -> Result<Scene, String> {
+fn scene(robot: &Arc<Robot>, json: &str) -> Result<Scene, String> {
     let scene: Scene = serde_json::from_str(json).map_err(|e| format!("the scene cannot be read: {e}"))?;
+    let scene = Scene { robot: Arc::clone(robot), ..scene };
     check_scene(&scene).map_err(|why| format!("the scene cannot be: {why}"))?;
     Ok(scene)
 }
 
-/// A row of nine columns.
-fn numbers(columns: &[&[f64]], row: usize) -> Result<[f64; JOINTS], String> {
-    let values: [f64; JOINTS] = std::array::from_fn(|j| columns[j][row]);
+/// A row of as many columns as there are joints.
+fn numbers(robot: &Robot, columns: &[&[f64]], row: usize) -> Result<Joints, String> {
+    let values = Joints::from_fn(columns.len(), |j| columns[j][row]);
+    let name = |j: usize| &robot.joints[j].name;
     match values.iter().position(|v| v.is_nan() || v.abs() > LARGEST_NUMBER) {
-        Some(j) if values[j].is_finite() => Err(format!("{} is {:e}, no angle or velocity of an arm", JOINT_NAMES[j], values[j])),
-        Some(j) => Err(format!("{} is {}, not a finite number", JOINT_NAMES[j], values[j])),
+        Some(j) if values[j].is_finite() => Err(format!("{} is {:e}, no position or velocity of a joint", name(j), values[j])),
+        Some(j) => Err(format!("{} is {}, not a finite number", name(j), values[j])),
         None => Ok(values),
     }
 }

@@ -10,10 +10,10 @@ use super::world::{Block, CLEARANCE_M, World};
 use crate::config::{MOST_STEPS, PlanSettings};
 use crate::demo::Phase;
 use crate::interrupt::Interrupt;
-use crate::robot::Ik;
-use crate::state::JOINTS;
-use crate::tasks::REACH_M;
+use crate::joints::Joints;
+use crate::robot::{Ik, Robot};
 use rand::Rng;
+use std::sync::Arc;
 
 /// Corners are rounded this far before and behind \[m\]; the narrower one where the wider would touch something.
 const CORNERS_M: [f64; 2] = [0.05, 0.015];
@@ -39,7 +39,7 @@ pub(super) struct Leg {
     /// Distance that the path keeps before smoothing \[m\].
     pub(super) margin_m: f64,
     /// Joint angles at the first knot \[rad\].
-    pub(super) start: [f64; JOINTS],
+    pub(super) start: Joints,
 }
 
 impl Leg {
@@ -58,6 +58,7 @@ impl Leg {
 
 /// Makes motions; keeps its programs between them, which leave no trace in the results.
 pub(super) struct Motions {
+    pub(super) robot: Arc<Robot>,
     pub(super) settings: PlanSettings,
     pub(super) limits: Limits,
     pub(super) ik: Ik,
@@ -66,7 +67,7 @@ pub(super) struct Motions {
 
 impl Motions {
     /// Samples of the motion at the control rate.
-    pub(super) fn transit(&mut self, world: &World, leg: &Leg, rng: &mut impl Rng) -> Result<Vec<[f64; JOINTS]>, PlanError> {
+    pub(super) fn transit(&mut self, world: &World, leg: &Leg, rng: &mut impl Rng) -> Result<Vec<Joints>, PlanError> {
         let straight = match self.try_way(world, leg, &leg.higher(0.0)) {
             Ok(samples) => return Ok(samples),
             Err(why) => why,
@@ -87,7 +88,7 @@ impl Motions {
     }
 
     /// Joint path, clearance, time and smoothness of one way.
-    fn try_way(&mut self, world: &World, leg: &Leg, knots: &[Knot]) -> Result<Vec<[f64; JOINTS]>, PlanError> {
+    fn try_way(&mut self, world: &World, leg: &Leg, knots: &[Knot]) -> Result<Vec<Joints>, PlanError> {
         let mut last = PlanError::Transit(String::new());
         for corner_m in CORNERS_M {
             match self.try_corner(world, leg, knots, corner_m) {
@@ -101,7 +102,7 @@ impl Motions {
         Err(last)
     }
 
-    fn try_corner(&mut self, world: &World, leg: &Leg, knots: &[Knot], corner_m: f64) -> Result<Vec<[f64; JOINTS]>, PlanError> {
+    fn try_corner(&mut self, world: &World, leg: &Leg, knots: &[Knot], corner_m: f64) -> Result<Vec<Joints>, PlanError> {
         let transit = |why: String| PlanError::Transit(format!("{}: {why}", leg.phase.name()));
         if self.interrupt.is_raised() {
             return Err(transit("interrupted".into()));
@@ -117,11 +118,14 @@ impl Motions {
     }
 
     /// Joint angles at a hand pose, by way of `seed`.
-    pub(super) fn reach(&mut self, knot: &Knot, seed: &[f64; JOINTS], place: &str) -> Result<[f64; JOINTS], PlanError> {
-        let [near, far] = REACH_M;
+    pub(super) fn reach(&mut self, knot: &Knot, seed: &Joints, place: &str) -> Result<Joints, PlanError> {
+        let reaches = match self.robot.reach_m {
+            Some([near, far]) => format!("it reaches {near} m to {far} m around the foot"),
+            None => "see `hilt robot check`".into(),
+        };
         self.ik.solve(&tool_pose(knot), seed).map_err(|why| {
             PlanError::Grasp(format!(
-                "the level hand cannot reach {place}: {why}; it reaches {near} m to {far} m around the base, set the spawn area \
+                "the level hand cannot reach {place}: {why}; {reaches}, set the spawn area \
                  (scene.spawn_x_m, scene.spawn_y_m) and scene.base_xy_m within"
             ))
         })
@@ -146,7 +150,7 @@ impl Motions {
 }
 
 /// Times and smooths a joint path; slower when that is what the limits ask for.
-pub(super) fn smooth_path(path: &[[f64; JOINTS]], limits: &Limits, interrupt: &Interrupt) -> Result<Vec<[f64; JOINTS]>, String> {
+pub(super) fn smooth_path(path: &[Joints], limits: &Limits, interrupt: &Interrupt) -> Result<Vec<Joints>, String> {
     for attempt in 0..SMOOTH_ATTEMPTS {
         let timed = time(path, limits, STRETCH.powi(attempt)).map_err(too_long)?;
         match smooth(&timed, limits, interrupt) {
@@ -170,6 +174,6 @@ fn too_long(steps: f64) -> String {
 }
 
 /// Checks a joint path at the resolution of the collision check.
-fn clear(world: &World, path: &[[f64; JOINTS]], block: &Block, margin_m: f64) -> Result<(), String> {
+fn clear(world: &World, path: &[Joints], block: &Block, margin_m: f64) -> Result<(), String> {
     path.windows(2).try_for_each(|w| world.check_motion(&w[0], &w[1], block, margin_m))
 }

@@ -2,13 +2,13 @@
 
 use crate::config::SceneSettings;
 use crate::error::{Error, Result};
-use crate::robot::collision::{Solid, place_links};
-use crate::robot::jaco::{HAND_LINK, LINK_NAMES, LINK_SHAPES};
-use crate::robot::kinematics::tool_of;
-use crate::robot::{Arm, LinkPoses, READY_Q_RAD};
+use crate::joints::Joints;
+use crate::robot::Robot;
+use crate::robot::collision::Solid;
 use crate::scene::{BLOCK_EDGE_M, Obstacle, Scene};
-use crate::state::{Context, JOINTS};
+use crate::state::Context;
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
+use std::sync::Arc;
 
 /// Least distance of arm and carried block to anything fixed, in a finished plan \[m\].
 pub const CLEARANCE_M: f64 = 0.01;
@@ -20,6 +20,8 @@ const HAND_TABLE_M: f64 = 0.002;
 const HAND_BLOCK_M: f64 = 0.003;
 /// Least distance between the arm's own links \[m\].
 const SELF_M: f64 = 0.005;
+/// Joints of the wrist: what they move may meet foot, shoulder and upper arm.
+const WRIST: usize = 3;
 /// The carried block may sink this far into its support \[m\]: it begins in contact, and the numbers are rounded.
 const SUPPORT_SLACK_M: f64 = 1e-3;
 /// The support of the block may be touched within this distance of grasp and release, sideways \[m\] ...
@@ -41,18 +43,18 @@ pub(super) enum Block {
     Held(Isometry3<f64>),
 }
 
-/// Whether the boxes of the settings leave the arm's ready pose free, from which every episode begins.
+/// Whether the boxes of the settings leave the robot's ready pose free, from which every episode begins.
 ///
 /// # Errors
 /// [`Error::Usage`] names the box, and the link that it touches.
-pub fn check_ready_pose(settings: &SceneSettings) -> Result<()> {
-    let links = place_links(&Arm::new().link_poses(&READY_Q_RAD));
+pub fn check_ready_pose(robot: &Robot, settings: &SceneSettings) -> Result<()> {
+    let links = robot.solids(&robot.link_poses(&robot.ready));
     for (i, Obstacle { center_m, size_m }) in settings.obstacles.iter().enumerate() {
         let at = Isometry3::from_parts(Translation3::from(*center_m), UnitQuaternion::identity());
         let solid = Solid::cuboid(at, size_m.map(|s| s / 2.0));
-        let touched = links.iter().zip(&LINK_SHAPES).find(|(link, _)| !link.farther_than(&solid, CLEARANCE_M));
-        if let Some((_, shape)) = touched {
-            let (link, room) = (LINK_NAMES[shape.link], CLEARANCE_M * 1e3);
+        let touched = links.iter().find(|(_, link)| !link.farther_than(&solid, CLEARANCE_M));
+        if let Some((link, _)) = touched {
+            let (link, room) = (&robot.links[*link].name, CLEARANCE_M * 1e3);
             return Err(Error::Usage(format!(
                 "scene.obstacles[{i}], center_m {center_m:?} and size_m {size_m:?}, comes within {room:.0} mm of the arm where every \
                  episode begins ({link}): move the box or make it smaller"
@@ -65,7 +67,7 @@ pub fn check_ready_pose(settings: &SceneSettings) -> Result<()> {
 /// The fixed things of a scene.
 #[derive(Clone, Debug)]
 pub(super) struct World {
-    arm: Arm,
+    robot: Arc<Robot>,
     obstacles: Vec<Solid>,
     base_block: Option<Solid>,
     /// Where the block's centre is released \[m\].
@@ -87,7 +89,7 @@ impl World {
             Context::Base(base) => Some(Solid::cuboid(base.isometry(), [BLOCK_EDGE_M / 2.0; 3])),
             _ => None,
         };
-        World { arm: Arm::new(), obstacles, base_block, release_m: scene.target_m().into() }
+        World { robot: Arc::clone(&scene.robot), obstacles, base_block, release_m: scene.target_m().into() }
     }
 
     /// Whether anything stands there that a straight way could meet.
@@ -99,31 +101,31 @@ impl World {
     ///
     /// # Errors
     /// Names what comes too near to what.
-    pub(super) fn check(&self, q: &[f64; JOINTS], block: &Block, margin_m: f64) -> Free {
-        self.check_poses(&self.arm.link_poses(q), block, margin_m)
+    pub(super) fn check(&self, q: &Joints, block: &Block, margin_m: f64) -> Free {
+        self.check_poses(&self.robot.link_poses(q), block, margin_m)
     }
 
     /// The same along the straight joint path between two configurations, at [`RESOLUTION_M`]; the first one is not checked.
-    pub(super) fn check_motion(&self, from: &[f64; JOINTS], to: &[f64; JOINTS], block: &Block, margin_m: f64) -> Free {
-        let end = self.arm.link_poses(to);
-        let steps = (travel_m(&self.arm.link_poses(from), &end) / RESOLUTION_M).ceil().max(1.0) as usize;
+    pub(super) fn check_motion(&self, from: &Joints, to: &Joints, block: &Block, margin_m: f64) -> Free {
+        let end = self.robot.link_poses(to);
+        let steps = (self.travel_m(&self.robot.link_poses(from), &end) / RESOLUTION_M).ceil().max(1.0) as usize;
         for k in 1..steps {
             let t = k as f64 / steps as f64;
-            let q = std::array::from_fn(|i| from[i] + t * (to[i] - from[i]));
+            let q = Joints::from_fn(from.len(), |i| from[i] + t * (to[i] - from[i]));
             self.check(&q, block, margin_m)?;
         }
         self.check_poses(&end, block, margin_m)
     }
 
-    fn check_poses(&self, poses: &LinkPoses, block: &Block, margin_m: f64) -> Free {
-        let links = place_links(poses);
-        let tool = tool_of(poses);
+    fn check_poses(&self, poses: &[Isometry3<f64>], block: &Block, margin_m: f64) -> Free {
+        let links = self.robot.solids(poses);
+        let tool = self.robot.tool_of(poses);
         let at_release = self.at_release(&tool);
-        for (solid, spec) in links.iter().zip(&LINK_SHAPES) {
-            let name = LINK_NAMES[spec.link];
-            let (hand, finger) = (spec.link >= HAND_LINK, spec.link > HAND_LINK);
+        for (link, solid) in &links {
+            let name = &self.robot.links[*link].name;
+            let (hand, finger) = (*link >= self.robot.hand(), *link > self.robot.hand());
             let table = if hand { HAND_TABLE_M } else { margin_m };
-            if spec.link > 0 && solid.lowest_m() < table {
+            if *link > 0 && solid.lowest_m() < table {
                 return Err(format!("{name} comes within {:.0} mm of the table", table * 1e3));
             }
             let base_margin = if finger && at_release { HAND_TABLE_M } else { margin_m };
@@ -142,7 +144,7 @@ impl World {
             let base_margin = if at_release { -SUPPORT_SLACK_M } else { margin_m };
             self.check_fixed(&carried, "the carried block", margin_m, base_margin)?;
         }
-        check_self(&links)
+        self.check_self(&links)
     }
 
     fn check_fixed(&self, solid: &Solid, name: &str, margin_m: f64, base_margin_m: f64) -> Free {
@@ -159,25 +161,25 @@ impl World {
         let away = tool.translation.vector - self.release_m;
         away.xy().norm() < SUPPORT_ZONE_XY_M && away.z < SUPPORT_ZONE_Z_M
     }
-}
 
-/// Coarse: wrist, hand and fingers against base, shoulder and upper arm.
-fn check_self(links: &[Solid]) -> Free {
-    let with =
-        |range: std::ops::RangeInclusive<usize>| LINK_SHAPES.iter().zip(links).filter(move |(s, _)| range.contains(&s.link));
-    for (outer, a) in with(4..=9) {
-        for (inner, b) in with(0..=2) {
-            if !a.farther_than(b, SELF_M) {
-                return Err(format!("{} comes too near to {}", LINK_NAMES[outer.link], LINK_NAMES[inner.link]));
+    /// Coarse: what the last three joints of the arm move, and the fingers, against what stands before the first three of those.
+    fn check_self(&self, links: &[(usize, Solid)]) -> Free {
+        let name = |link: &usize| &self.robot.links[*link].name;
+        let [outer_from, inner_to] = [self.robot.arm.saturating_sub(WRIST - 1), self.robot.arm.saturating_sub(WRIST + 1)];
+        for (outer, a) in links.iter().filter(|(link, _)| *link >= outer_from) {
+            for (inner, b) in links.iter().filter(|(link, _)| *link <= inner_to && *link < outer_from) {
+                if !a.farther_than(b, SELF_M) {
+                    return Err(format!("{} comes too near to {}", name(outer), name(inner)));
+                }
             }
         }
+        Ok(())
     }
-    Ok(())
-}
 
-/// The farthest that elbow, wrist, hand or fingertip move between two configurations \[m\].
-fn travel_m(a: &LinkPoses, b: &LinkPoses) -> f64 {
-    let origins = a.iter().zip(b).map(|(a, b)| (a.translation.vector - b.translation.vector).norm());
-    let tip = (tool_of(a).translation.vector - tool_of(b).translation.vector).norm();
-    origins.fold(tip, f64::max)
+    /// The farthest that elbow, wrist, hand or fingertip move between two configurations \[m\].
+    fn travel_m(&self, a: &[Isometry3<f64>], b: &[Isometry3<f64>]) -> f64 {
+        let origins = a.iter().zip(b).map(|(a, b)| (a.translation.vector - b.translation.vector).norm());
+        let [of_a, of_b] = [a, b].map(|poses| self.robot.tool_of(poses).translation.vector);
+        origins.fold((of_a - of_b).norm(), f64::max)
+    }
 }

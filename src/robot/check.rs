@@ -1,6 +1,7 @@
 //! What there is to know about a robot before it is used: what is doubtful, where its hand gets to, how well it moves there.
 
 use super::collision::Solid;
+use super::hand::opposing;
 use super::ik::Ik;
 use super::model::{Jacobian, JointKind, Robot};
 use crate::error::Result;
@@ -71,11 +72,14 @@ pub fn check(robot: &Arc<Robot>, interrupt: &Interrupt) -> Result<Findings> {
     doubt_numbers(robot, &mut doubts);
     doubt_ready(robot, &poses, &mut doubts);
     doubt_strength(robot, &poses, &mut doubts);
-    let opposing = opposing(robot);
+    let opposing = opposing(robot).into_iter().min_by(|a, b| a.cosine.total_cmp(&b.cosine));
     if opposing.is_none() {
         doubts.push("no two fingers close on each other: none can hold a block against another".into());
     }
     let reach = reach(robot, interrupt)?;
+    if let (None, Some([near, far])) = (robot.reach_m, reach.ahead_m) {
+        doubts.push(format!("reach_m is not said: scenes are drawn where the hand does not get to; straight ahead it gets from {near:.2} to {far:.2} m"));
+    }
     match reach.ahead_m {
         None => doubts.push(format!("nowhere straight ahead does the hand get down to {REACH_HEIGHT_M} m over the table")),
         Some([near, far]) if far - near < 2.0 * GRID_M => {
@@ -86,8 +90,8 @@ pub fn check(robot: &Arc<Robot>, interrupt: &Interrupt) -> Result<Findings> {
     Ok(Findings {
         doubts,
         ready_tool_m: robot.tool_of(&poses).translation.vector.into(),
-        opening_m: opposing.as_ref().map(|found| found.1),
-        opposing: opposing.map(|(pair, _)| pair.map(|i| robot.joints[i].name.clone())),
+        opening_m: opposing.as_ref().map(|found| found.room_m),
+        opposing: opposing.map(|found| found.pair.map(|i| robot.joints[robot.arm + i].name.clone())),
         reach,
     })
 }
@@ -169,36 +173,6 @@ fn doubt_strength(robot: &Robot, poses: &[Isometry3<f64>], doubts: &mut Vec<Stri
     }
 }
 
-/// The fingers that close on each other best, and the room between them in the open hand.
-fn opposing(robot: &Robot) -> Option<([usize; 2], f64)> {
-    let mut closed = robot.ready.clone();
-    closed[robot.arm..].copy_from_slice(&robot.closed);
-    let tips = |q: &[f64]| -> Vec<Vector3<f64>> {
-        let poses = robot.link_poses(q);
-        let tool = robot.tool_of(&poses);
-        // The shape nearest to the tool is the pad.
-        let pad = |joint: usize| {
-            let centers = robot.links[joint + 1].shapes.iter().map(|shape| Solid::of(shape, &poses[joint + 1]).sphere().0);
-            let local = centers.map(|center| tool.inverse_transform_point(&center).coords);
-            local.min_by(|a, b| a.norm().total_cmp(&b.norm())).unwrap_or_default()
-        };
-        robot.fingers().map(pad).collect()
-    };
-    let (open, shut) = (tips(&robot.ready), tips(&closed));
-    let ways: Vec<Vector3<f64>> = open.iter().zip(&shut).map(|(open, shut)| shut - open).collect();
-    let mut best: Option<([usize; 2], f64, f64)> = None;
-    for a in 0..ways.len() {
-        for b in a + 1..ways.len() {
-            let against = ways[a].xy().dot(&ways[b].xy()) / (ways[a].norm() * ways[b].norm()).max(f64::MIN_POSITIVE);
-            if against < -0.1 && best.is_none_or(|(_, least, _)| against < least) {
-                let room = (open[a] - open[b]).xy().norm();
-                best = Some(([robot.arm + a, robot.arm + b], against, room));
-            }
-        }
-    }
-    best.map(|(pair, _, room)| (pair, room))
-}
-
 fn reach(robot: &Arc<Robot>, interrupt: &Interrupt) -> Result<Reach> {
     let line = |[low, high]: [f64; 2]| -> Vec<f64> {
         let steps = ((high - low) / GRID_M).round() as usize;
@@ -211,8 +185,7 @@ fn reach(robot: &Arc<Robot>, interrupt: &Interrupt) -> Result<Reach> {
         interrupt.check()?;
         let row = y_m.iter().map(|y| {
             let target = Isometry3::from_parts(Translation3::new(*x, *y, REACH_HEIGHT_M), UnitQuaternion::identity());
-            let mut q = robot.ready.clone();
-            ik.solve_in_place(&target, &mut q).ok().map(|()| {
+            ik.solve(&target, &robot.ready).ok().map(|q| {
                 let (_, jacobian) = robot.tool_jacobian(&q);
                 manipulability(&jacobian)
             })

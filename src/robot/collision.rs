@@ -1,8 +1,6 @@
 //! Distances between convex primitives. All are exact or lower bounds, so "farther than" never errs on the wrong side.
 
-use super::jaco::{LINK_SHAPES, Shape};
-use super::kinematics::LinkPoses;
-use super::model;
+use super::model::{Robot, Shape};
 use nalgebra::{Isometry3, Point3, Vector3};
 
 /// Rounds of the search for the point of a segment nearest to a box; each shrinks the interval by 0.62.
@@ -40,12 +38,12 @@ impl Solid {
     }
 
     /// A primitive of a link that stands at `pose`.
-    pub fn of(shape: &model::Shape, pose: &Isometry3<f64>) -> Self {
+    pub fn of(shape: &Shape, pose: &Isometry3<f64>) -> Self {
         match *shape {
-            model::Shape::Capsule { from_m, to_m, radius_m } => {
+            Shape::Capsule { from_m, to_m, radius_m } => {
                 Solid::Capsule { from: pose * Point3::from(from_m), to: pose * Point3::from(to_m), radius_m }
             }
-            model::Shape::Box { pose: at, half_m } => Solid::cuboid(pose * at, half_m),
+            Shape::Box { pose: at, half_m } => Solid::cuboid(pose * at, half_m),
         }
     }
 
@@ -89,17 +87,15 @@ impl Solid {
     }
 }
 
-/// The arm's primitives at these link poses, in the order of [`LINK_SHAPES`].
-pub fn place_links(poses: &LinkPoses) -> [Solid; LINK_SHAPES.len()] {
-    LINK_SHAPES.map(|s| {
-        let pose = &poses[s.link];
-        match s.shape {
-            Shape::Capsule { from_m, to_m, radius_m } => {
-                Solid::Capsule { from: pose * Point3::from(from_m), to: pose * Point3::from(to_m), radius_m }
-            }
-            Shape::Box { center_m, half_m } => Solid::cuboid(pose * nalgebra::Translation3::from(center_m), half_m),
-        }
-    })
+impl Robot {
+    /// The collision primitives at these poses of the links, each with its link.
+    pub fn solids(&self, poses: &[Isometry3<f64>]) -> Vec<(usize, Solid)> {
+        let of_link = |(link, pose): (usize, &Isometry3<f64>)| {
+            let pose = *pose;
+            self.links[link].shapes.iter().map(move |shape| (link, Solid::of(shape, &pose)))
+        };
+        poses.iter().enumerate().flat_map(of_link).collect()
+    }
 }
 
 fn segment_to_segment_m([a, b]: [&Point3<f64>; 2], [c, d]: [&Point3<f64>; 2]) -> f64 {

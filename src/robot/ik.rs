@@ -1,6 +1,7 @@
 //! Differential inverse kinematics as a quadratic program: joint steps that reduce the tool's pose error, within joint and velocity limits.
 
 use super::model::{Jacobian, Robot};
+use crate::joints::Joints;
 use clarabel::algebra::CscMatrix;
 use clarabel::solver::{DefaultSettings, DefaultSolver, IPSolver, SolverStatus, SupportedConeT};
 use nalgebra::{DMatrix, Isometry3, Vector6};
@@ -77,29 +78,21 @@ impl Ik {
     ///
     /// # Errors
     /// [`Unreachable`]: how far the tool stayed away.
-    pub fn solve<const N: usize>(&mut self, target: &Isometry3<f64>, seed: &[f64; N]) -> Result<[f64; N], Unreachable> {
+    pub fn solve(&mut self, target: &Isometry3<f64>, seed: &Joints) -> Result<Joints, Unreachable> {
         let mut q = *seed;
-        self.solve_in_place(target, &mut q).map(|()| q)
-    }
-
-    /// The same for any number of joints, in place of the seed.
-    ///
-    /// # Errors
-    /// As [`Ik::solve`].
-    pub fn solve_in_place(&mut self, target: &Isometry3<f64>, q: &mut [f64]) -> Result<(), Unreachable> {
         for _ in 0..MAX_STEPS {
-            let (tool, jacobian) = self.robot.tool_jacobian(q);
+            let (tool, jacobian) = self.robot.tool_jacobian(&q);
             let error = pose_error(&tool, target);
-            let Some(step) = self.step(q, &jacobian, &error) else { break };
+            let Some(step) = self.step(&q, &jacobian, &error) else { break };
             q.iter_mut().zip(&step).for_each(|(q, d)| *q += d);
             if step.iter().all(|d| d.abs() < CONVERGED_RAD) {
                 break;
             }
         }
-        let error = pose_error(&self.robot.tool_pose(q), target);
+        let error = pose_error(&self.robot.tool_pose(&q), target);
         let (position, rotation) = (error.fixed_rows::<3>(0).norm(), error.fixed_rows::<3>(3).norm());
         if position < POSITION_TOLERANCE_M && rotation < ROTATION_TOLERANCE_RAD {
-            return Ok(());
+            return Ok(q);
         }
         Err(Unreachable { target_m: target.translation.vector.into(), position_error_m: position, rotation_error_rad: rotation })
     }
@@ -168,8 +161,7 @@ fn box_rows(n: usize) -> CscMatrix<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::robot::{READY_Q_RAD, file::built_in::jaco};
-    use crate::state::ARM_JOINTS;
+    use crate::robot::file::built_in::paper_robot;
     use nalgebra::{Translation3, UnitQuaternion};
 
     fn hand_down(x: f64, y: f64, z: f64, yaw: f64) -> Isometry3<f64> {
@@ -178,29 +170,31 @@ mod tests {
 
     #[test]
     fn reaches_what_forward_kinematics_confirms() {
-        let mut ik = Ik::new(&jaco());
+        let mut ik = Ik::new(&paper_robot());
         for (x, y, z, yaw) in [(0.45, 0.0, 0.3, 0.0), (0.4, 0.1, 0.05, 0.3), (0.6, -0.12, 0.1, -0.4)] {
             let target = hand_down(x, y, z, yaw);
-            let q = ik.solve(&target, &READY_Q_RAD).expect("within reach");
-            let tool = jaco().tool_pose(&q);
+            let q = ik.solve(&target, &paper_robot().ready).expect("within reach");
+            let tool = paper_robot().tool_pose(&q);
             assert!((tool.translation.vector - target.translation.vector).norm() < POSITION_TOLERANCE_M);
             assert!(tool.rotation.angle_to(&target.rotation) < ROTATION_TOLERANCE_RAD);
-            assert_eq!(q[ARM_JOINTS..], READY_Q_RAD[ARM_JOINTS..]);
+            assert_eq!(q[paper_robot().arm..], paper_robot().ready[paper_robot().arm..]);
         }
     }
 
     #[test]
     fn says_how_far_it_stays_from_what_it_cannot_reach() {
-        let failure = Ik::new(&jaco()).solve(&hand_down(1.5, 0.0, 0.1, 0.0), &READY_Q_RAD).expect_err("beyond the arm's length");
+        let failure = Ik::new(&paper_robot())
+            .solve(&hand_down(1.5, 0.0, 0.1, 0.0), &paper_robot().ready)
+            .expect_err("beyond the arm's length");
         assert!(failure.position_error_m > 0.3, "{failure}");
         assert!(failure.to_string().contains("1.500"), "{failure}");
     }
 
     #[test]
     fn earlier_targets_leave_no_trace() {
-        let (mut fresh, mut used) = (Ik::new(&jaco()), Ik::new(&jaco()));
-        let _ = used.solve(&hand_down(0.6, 0.1, 0.1, 0.5), &READY_Q_RAD);
+        let (mut fresh, mut used) = (Ik::new(&paper_robot()), Ik::new(&paper_robot()));
+        let _ = used.solve(&hand_down(0.6, 0.1, 0.1, 0.5), &paper_robot().ready);
         let target = hand_down(0.35, -0.1, 0.05, 0.0);
-        assert_eq!(fresh.solve(&target, &READY_Q_RAD), used.solve(&target, &READY_Q_RAD));
+        assert_eq!(fresh.solve(&target, &paper_robot().ready), used.solve(&target, &paper_robot().ready));
     }
 }

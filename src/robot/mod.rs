@@ -1,17 +1,14 @@
-//! The arm: constants of the Kinova Jaco j2n6s300, forward kinematics, Jacobian, differential inverse kinematics, URDF. And robots as data, from two
-//! files each: [`Robot`] is what they say, [`file::read`] reads them.
+//! Robots as data, from two files each: [`Robot`] is what they say, [`file::read`] reads them. Kinematics, distances, differential inverse
+//! kinematics, and what there is to know about a robot before it is used.
 
 pub mod check;
 pub mod collision;
 pub mod file;
+mod hand;
 pub mod ik;
-pub mod jaco;
-pub mod kinematics;
 pub mod model;
-pub mod urdf;
+mod urdf;
 
 pub use ik::{Ik, Unreachable};
-pub use jaco::{LINK_SHAPES, LinkShape, POSITION_LIMITS_RAD, READY_Q_RAD, Shape, VELOCITY_LIMITS_RAD_S};
-pub use kinematics::{Arm, LinkPoses};
 pub use model::Robot;
-pub use urdf::urdf;
+pub use urdf::{TOOL_FRAME, urdf};

@@ -1,48 +1,44 @@
-//! The arm as a URDF document, written from the same constants that planning, simulation and pictures use.
+//! A robot as a URDF document, as hilt has it: what is fixed is one link, joints act along the z axis of their links.
 //!
-//! Links carry [`LINK_NAMES`] (the `child_frame_id` of recorded transforms) and joints carry [`JOINT_NAMES`] unchanged (the names in
-//! recorded joint states), so a viewer can pose the model from either. URDF knows no capsule: one is a cylinder and two spheres.
+//! Links and joints keep their names, so that a viewer can pose the model from recorded transforms or from recorded joint states. URDF knows no
+//! capsule: one is a cylinder and two spheres.
 
-use super::jaco::{
-    HAND_LINK, JOINT_SPECS, LINK_INERTIA, LINK_NAMES, LINK_SHAPES, LINKS, LinkInertia, POSITION_LIMITS_RAD, Shape,
-    TOOL_IN_HAND_M, TORQUE_LIMITS_N_M, VELOCITY_LIMITS_RAD_S,
-};
-use crate::state::{JOINT_NAMES, JOINTS};
-use nalgebra::{UnitQuaternion, Vector3};
-use std::f64::consts::TAU;
+use super::model::{Inertia, Joint, JointKind, Robot, Shape};
+use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 
-/// Name of the robot in the document.
-pub const ROBOT_NAME: &str = "j2n6s300";
 /// Name of the massless frame at the tool point, fixed to the hand.
-pub const TOOL_FRAME: &str = "j2n6s300_end_effector";
-/// Name of the fixed joint that carries [`TOOL_FRAME`].
-pub const TOOL_JOINT: &str = "end_effector";
-/// Colour of the arm, red green blue alpha in 0..=1.
-const ARM_RGBA: &str = "0.36 0.39 0.45 1";
+pub const TOOL_FRAME: &str = "hilt_tool";
+/// Colour of the robot, red green blue alpha in 0..=1.
+const RGBA: &str = "0.36 0.39 0.45 1";
 
-/// The document: ten links with inertia, visual and collision geometry, nine joints (`continuous` where the arm turns freely,
-/// else `revolute`) about their local z axis, and the tool frame. Lengths in m, angles in rad, masses in kg. Pure function of the
-/// constants in [`super::jaco`].
-pub fn urdf() -> String {
-    let mut xml = format!("<?xml version=\"1.0\"?>\n<robot name=\"{ROBOT_NAME}\">\n");
-    xml += &format!("  <material name=\"arm\"><color rgba=\"{ARM_RGBA}\"/></material>\n");
-    (0..LINKS).for_each(|link| xml += &link_element(link));
-    (0..JOINTS).for_each(|joint| xml += &joint_element(joint));
-    xml += &format!("  <link name=\"{TOOL_FRAME}\"/>\n  <joint name=\"{TOOL_JOINT}\" type=\"fixed\">\n");
-    xml += &format!("    {}\n", origin(TOOL_IN_HAND_M, [0.0; 3]));
-    xml += &format!("    <parent link=\"{}\"/>\n    <child link=\"{TOOL_FRAME}\"/>\n  </joint>\n", LINK_NAMES[HAND_LINK]);
+/// The document: links with inertia, visual and collision geometry, joints (`continuous` where nothing stops them) along their local z axis, and
+/// the tool's frame. Lengths in m, angles in rad, masses in kg.
+pub fn urdf(robot: &Robot) -> String {
+    let name = escaped(&robot.name);
+    let mut xml = format!("<?xml version=\"1.0\"?>\n<robot name=\"{name}\">\n");
+    xml += &format!("  <material name=\"robot\"><color rgba=\"{RGBA}\"/></material>\n");
+    robot.links.iter().for_each(|link| xml += &link_element(&link.name, &link.inertia, &link.shapes));
+    let links = robot.links.iter().map(|link| escaped(&link.name)).collect::<Vec<_>>();
+    robot.joints.iter().enumerate().for_each(|(i, joint)| xml += &joint_element(joint, &links[joint.parent], &links[i + 1]));
+    xml += &format!("  <link name=\"{TOOL_FRAME}\"/>\n  <joint name=\"{TOOL_FRAME}\" type=\"fixed\">\n");
+    let tool = Isometry3::from_parts(robot.tool_m.into(), robot.tool_from_hand.inverse());
+    let hand = &links[robot.hand()];
+    xml += &format!("    {}\n    <parent link=\"{hand}\"/>\n    <child link=\"{TOOL_FRAME}\"/>\n  </joint>\n", origin(&tool));
     xml + "</robot>\n"
 }
 
-fn link_element(link: usize) -> String {
-    let LinkInertia { mass_kg, com_m, inertia_kg_m2: [ixx, iyy, izz] } = LINK_INERTIA[link];
-    let mut xml = format!("  <link name=\"{}\">\n    <inertial>\n      {}\n", LINK_NAMES[link], origin(com_m, [0.0; 3]));
-    xml +=
-        &format!("      <mass value=\"{mass_kg}\"/>\n      <inertia ixx=\"{ixx}\" ixy=\"0\" ixz=\"0\" iyy=\"{iyy}\" iyz=\"0\" ");
-    xml += &format!("izz=\"{izz}\"/>\n    </inertial>\n");
-    let solids: Vec<String> = LINK_SHAPES.iter().filter(|s| s.link == link).flat_map(|s| solids(&s.shape)).collect();
+fn link_element(name: &str, inertia: &Inertia, shapes: &[Shape]) -> String {
+    let Inertia { mass_kg, com_m, principal_kg_m2: [ixx, iyy, izz], axes } = *inertia;
+    let mut xml = format!("  <link name=\"{}\">\n", escaped(name));
+    if mass_kg > 0.0 {
+        xml += &format!("    <inertial>\n      {}\n      <mass value=\"{mass_kg}\"/>\n", placed(com_m, axes));
+        xml += &format!(
+            "      <inertia ixx=\"{ixx}\" ixy=\"0\" ixz=\"0\" iyy=\"{iyy}\" iyz=\"0\" izz=\"{izz}\"/>\n    </inertial>\n"
+        );
+    }
+    let solids: Vec<String> = shapes.iter().flat_map(solids).collect();
     for solid in &solids {
-        xml += &format!("    <visual>\n{solid}      <material name=\"arm\"/>\n    </visual>\n");
+        xml += &format!("    <visual>\n{solid}      <material name=\"robot\"/>\n    </visual>\n");
     }
     for solid in &solids {
         xml += &format!("    <collision>\n{solid}    </collision>\n");
@@ -50,48 +46,59 @@ fn link_element(link: usize) -> String {
     xml + "  </link>\n"
 }
 
-fn joint_element(joint: usize) -> String {
-    let spec = &JOINT_SPECS[joint];
-    let [low, high] = POSITION_LIMITS_RAD[joint];
-    let free = high - low > TAU;
-    let kind = if free { "continuous" } else { "revolute" };
-    let range = if free { String::new() } else { format!("lower=\"{low}\" upper=\"{high}\" ") };
-    let (effort, velocity) = (TORQUE_LIMITS_N_M[joint], VELOCITY_LIMITS_RAD_S[joint]);
-    let mut xml = format!("  <joint name=\"{}\" type=\"{kind}\">\n", JOINT_NAMES[joint]);
-    xml += &format!("    {}\n    <parent link=\"{}\"/>\n", origin(spec.xyz_m, spec.rpy_rad), LINK_NAMES[spec.parent]);
-    xml += &format!("    <child link=\"{}\"/>\n    <axis xyz=\"0 0 1\"/>\n", LINK_NAMES[joint + 1]);
+fn joint_element(joint: &Joint, parent: &str, child: &str) -> String {
+    let [low, high] = joint.limits;
+    let kind = match joint.kind {
+        JointKind::Prismatic => "prismatic",
+        JointKind::Revolute if joint.continuous => "continuous",
+        JointKind::Revolute => "revolute",
+    };
+    let range = if joint.continuous { String::new() } else { format!("lower=\"{low}\" upper=\"{high}\" ") };
+    let (effort, velocity) = (joint.effort, joint.velocity);
+    let mut xml = format!("  <joint name=\"{}\" type=\"{kind}\">\n", escaped(&joint.name));
+    xml += &format!("    {}\n    <parent link=\"{parent}\"/>\n", origin(&joint.origin));
+    xml += &format!("    <child link=\"{child}\"/>\n    <axis xyz=\"0 0 1\"/>\n");
     xml + &format!("    <limit {range}effort=\"{effort}\" velocity=\"{velocity}\"/>\n  </joint>\n")
 }
 
-/// `<origin>` and `<geometry>` of each solid that makes up a shape.
+/// The geometry of a shape: elements between `<visual>` or `<collision>` and what follows.
 fn solids(shape: &Shape) -> Vec<String> {
     match *shape {
-        Shape::Box { center_m, half_m: [x, y, z] } => {
-            vec![solid(center_m, [0.0; 3], &format!("<box size=\"{} {} {}\"/>", 2.0 * x, 2.0 * y, 2.0 * z))]
+        Shape::Box { pose, half_m } => {
+            let [x, y, z] = half_m.map(|h| 2.0 * h);
+            vec![solid(&origin(&pose), &format!("<box size=\"{x} {y} {z}\"/>"))]
         }
         Shape::Capsule { from_m, to_m, radius_m } => {
             let (from, to) = (Vector3::from(from_m), Vector3::from(to_m));
             let axis = to - from;
-            // A half turn (axis along -z) has no unique shortest rotation; a cylinder looks the same either way round.
-            let turn = UnitQuaternion::rotation_between(&Vector3::z(), &axis).unwrap_or_default();
-            let (roll, pitch, yaw) = turn.euler_angles();
-            let cylinder = format!("<cylinder radius=\"{radius_m}\" length=\"{}\"/>", axis.norm());
+            let turn = UnitQuaternion::rotation_between(&Vector3::z(), &axis)
+                .unwrap_or_else(|| UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI));
             let sphere = format!("<sphere radius=\"{radius_m}\"/>");
-            let middle = (from + to) / 2.0;
-            vec![
-                solid(middle.into(), [roll, pitch, yaw], &cylinder),
-                solid(from_m, [0.0; 3], &sphere),
-                solid(to_m, [0.0; 3], &sphere),
-            ]
+            let ball = |at: [f64; 3]| solid(&placed(at, UnitQuaternion::identity()), &sphere);
+            if axis.norm() == 0.0 {
+                return vec![ball(from_m)];
+            }
+            let cylinder = format!("<cylinder radius=\"{radius_m}\" length=\"{}\"/>", axis.norm());
+            vec![solid(&placed(((from + to) / 2.0).into(), turn), &cylinder), ball(from_m), ball(to_m)]
         }
     }
 }
 
-fn solid(xyz_m: [f64; 3], rpy_rad: [f64; 3], geometry: &str) -> String {
-    format!("      {}\n      <geometry>{geometry}</geometry>\n", origin(xyz_m, rpy_rad))
+fn solid(origin: &str, geometry: &str) -> String {
+    format!("      {origin}\n      <geometry>{geometry}</geometry>\n")
 }
 
-fn origin(xyz_m: [f64; 3], rpy_rad: [f64; 3]) -> String {
+fn origin(at: &Isometry3<f64>) -> String {
+    placed(at.translation.vector.into(), at.rotation)
+}
+
+fn placed(xyz_m: [f64; 3], turn: UnitQuaternion<f64>) -> String {
+    let (roll, pitch, yaw) = turn.euler_angles();
     let words = |v: [f64; 3]| v.map(|x| x.to_string()).join(" ");
-    format!("<origin xyz=\"{}\" rpy=\"{}\"/>", words(xyz_m), words(rpy_rad))
+    format!("<origin xyz=\"{}\" rpy=\"{}\"/>", words(xyz_m), words([roll, pitch, yaw]))
+}
+
+/// A name within quotes.
+fn escaped(name: &str) -> String {
+    name.replace('&', "&amp;").replace('<', "&lt;").replace('"', "&quot;")
 }

@@ -1,100 +1,105 @@
-//! The Jaco as a multibody in reduced coordinates, driven by nine joint velocity motors.
+//! A robot as a multibody in reduced coordinates, driven by a velocity motor a joint.
 
 use super::contacts::Owner;
-use super::convert::{isometry, vector};
-use crate::robot::jaco::{JOINT_SPECS, LINK_INERTIA, LINKS, TORQUE_LIMITS_N_M};
-use crate::robot::{Arm, LINK_SHAPES, POSITION_LIMITS_RAD, Shape};
-use crate::state::{ARM_JOINTS, Action, CONTROL_DT_S, JOINTS};
+use super::convert::{isometry, rotation, vector};
+use crate::joints::Joints;
+use crate::robot::Robot;
+use crate::robot::model::{Joint, JointKind, Shape};
+use crate::state::{Action, CONTROL_DT_S};
 use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 use rapier3d::prelude::*;
-use std::f64::consts::{FRAC_PI_2, TAU};
+use std::f64::consts::FRAC_PI_2;
 
-/// Gain of a velocity motor \[N m s/rad\]: so stiff that only the torque limit matters.
+/// Gain of a velocity motor \[N m s/rad, N s/m\]: so stiff that only its largest torque or force matters.
 const MOTOR_GAIN: Real = 1e5;
-/// Reflected inertia of the motors \[kg m^2\], arm and fingers (measured: 0 freezes the fingers).
-const ARMATURE_KG_M2: [Real; 2] = [0.2, 0.005];
-/// Viscous damping \[N m s/rad\], arm and fingers.
-const DAMPING_N_M_S: [Real; 2] = [0.1, 0.01];
-/// Dry friction \[N m\], arm and fingers: the fingers' worm drives cannot be pushed back; without it two fingers push the thumb open.
-/// As the solver meets it, a finger commanded slower than about 0.12 rad/s stands still.
-const DRY_FRICTION_N_M: [Real; 2] = [0.0, 0.6];
-/// Limits nearer than this are looked at \[rad\]: twice what a motor turns in a control step, beside what the joint's own velocity makes.
-const LIMIT_MARGIN_RAD: Real = 0.1;
+/// Limits nearer than this are looked at \[rad, and what counts as one\]: twice what a motor turns in a control step, beside what the joint's own
+/// velocity makes.
+const LIMIT_MARGIN_RAD: f64 = 0.1;
 /// Friction coefficient of the robot's surfaces and of the fixed things; the block's own multiplies it.
 pub(super) const SURFACE_FRICTION: Real = 1.0;
 
-/// Adds the robot at joint state `q`, `dq`; returns the handle of joint 1 (any joint's would do).
-pub(super) fn insert(physics: &mut PhysicsWorld, q: &[f64; JOINTS], dq: &[f64; JOINTS]) -> MultibodyJointHandle {
-    let links: [RigidBodyHandle; LINKS] = std::array::from_fn(|link| insert_link(physics, link));
-    let kinematics = Arm::new();
-    let joints: [MultibodyJointHandle; JOINTS] = std::array::from_fn(|i| {
+/// The axis along which rapier moves a joint: about the local x axis, or along it.
+pub(super) fn axis(kind: JointKind) -> JointAxis {
+    match kind {
+        JointKind::Revolute => JointAxis::AngX,
+        JointKind::Prismatic => JointAxis::LinX,
+    }
+}
+
+/// Adds the robot at joint state `q`, `dq`; returns the handle of its first joint (any joint's would do).
+pub(super) fn insert(physics: &mut PhysicsWorld, robot: &Robot, q: &[f64], dq: &[f64]) -> MultibodyJointHandle {
+    let links: Vec<RigidBodyHandle> = (0..robot.links.len()).map(|link| insert_link(physics, robot, link)).collect();
+    let mut handles = robot.joints.iter().enumerate().map(|(i, joint)| {
         physics
-            .insert_multibody_joint(links[JOINT_SPECS[i].parent], links[i + 1], joint(&kinematics, i))
+            .insert_multibody_joint(links[joint.parent], links[i + 1], as_rapier(joint))
             .expect("each link is the child of exactly one joint")
     });
-    let handle = joints[0];
+    let handle = handles.next().expect("a robot has joints");
+    handles.for_each(drop);
     let multibody = physics.multibody_joints.get_mut(handle).expect("the joint was inserted just now").0;
     // A new multibody floats: this first pass sees the fixed base and removes six degrees of freedom. Whatever is set by row
-    // (armature, damping, friction, angles) belongs after it.
+    // (armature, damping, friction, positions) belongs after it.
     multibody.forward_kinematics(&physics.bodies, true);
-    assert_eq!(multibody.ndofs(), JOINTS, "the robot has nine joints and a fixed base");
+    assert_eq!(multibody.ndofs(), robot.joints.len(), "one degree of freedom a joint, and a fixed foot");
     multibody.set_self_contacts_enabled(false);
-    for (i, velocity) in dq.iter().enumerate() {
-        let kind = usize::from(i >= ARM_JOINTS);
-        multibody.armature_mut()[i] = ARMATURE_KG_M2[kind];
-        multibody.damping_mut()[i] = DAMPING_N_M_S[kind];
-        multibody.frictions_mut()[i] = DRY_FRICTION_N_M[kind];
+    for (i, (joint, velocity)) in robot.joints.iter().zip(dq).enumerate() {
+        multibody.armature_mut()[i] = joint.motor.armature as Real;
+        multibody.damping_mut()[i] = joint.motor.damping as Real;
+        multibody.frictions_mut()[i] = joint.motor.friction as Real;
         multibody.generalized_velocity_mut()[i] = *velocity as Real;
     }
-    multibody.apply_displacements(&q.map(|v| v as Real));
+    multibody.apply_displacements(&q.iter().map(|v| *v as Real).collect::<Vec<_>>());
     multibody.forward_kinematics(&physics.bodies, false);
     multibody.update_rigid_bodies(&mut physics.bodies, true);
     handle
 }
 
-/// Sets the motors' velocities \[rad/s\], and which limits are looked at: a limit that no joint can reach in this control step is left
+/// Sets the motors' velocities \[rad/s, m/s\], and which limits are looked at: a limit that no joint can reach in this control step is left
 /// out, for it would be a row that holds nothing, factored and swept in every substep.
-pub(super) fn command(physics: &mut PhysicsWorld, arm: MultibodyJointHandle, action: &Action) {
-    let multibody = physics.multibody_joints.get_mut(arm).expect("the robot is never removed").0;
-    for (i, velocity) in action.iter().enumerate() {
-        let reach = LIMIT_MARGIN_RAD + CONTROL_DT_S as Real * multibody.generalized_velocity()[i].abs();
+pub(super) fn command(physics: &mut PhysicsWorld, robot: &Robot, handle: MultibodyJointHandle, action: &Action) {
+    let multibody = physics.multibody_joints.get_mut(handle).expect("the robot is never removed").0;
+    for (i, (joint, velocity)) in robot.joints.iter().zip(action).enumerate() {
+        let (axis, margin) = (axis(joint.kind), (LIMIT_MARGIN_RAD * joint.per_radian()) as Real);
+        let reach = margin + CONTROL_DT_S as Real * multibody.generalized_velocity()[i].abs();
         let link = multibody.link_mut(i + 1).expect("link i + 1 hangs on joint i");
-        let angle = link.joint.coords()[JointAxis::AngX as usize];
-        let joint = &mut link.joint.data;
-        joint.set_motor_velocity(JointAxis::AngX, *velocity as Real, MOTOR_GAIN);
-        if !is_continuous(i) {
-            let limits = joint.limits[JointAxis::AngX as usize];
-            let near = angle - reach < limits.min || angle + reach > limits.max;
-            joint.limit_axes.set(JointAxesMask::ANG_X, near);
+        let position = link.joint.coords()[axis as usize];
+        let data = &mut link.joint.data;
+        data.set_motor_velocity(axis, *velocity as Real, MOTOR_GAIN);
+        if !joint.continuous {
+            let limits = data.limits[axis as usize];
+            let near = position - reach < limits.min || position + reach > limits.max;
+            data.limit_axes.set(axis.into(), near);
         }
     }
 }
 
-/// Joint angles \[rad\] and velocities \[rad/s\].
-pub(super) fn read(physics: &PhysicsWorld, arm: MultibodyJointHandle) -> ([f64; JOINTS], [f64; JOINTS]) {
-    let multibody = physics.multibody_joints.get(arm).expect("the robot is never removed").0;
+/// Joint positions \[rad, m\] and velocities \[rad/s, m/s\].
+pub(super) fn read(physics: &PhysicsWorld, robot: &Robot, handle: MultibodyJointHandle) -> (Joints, Joints) {
+    let multibody = physics.multibody_joints.get(handle).expect("the robot is never removed").0;
     let velocity = multibody.generalized_velocity();
-    let angle = |i: usize| {
+    let position = |i: usize| {
         let link = multibody.link(i + 1).expect("link i + 1 hangs on joint i");
-        f64::from(link.joint.coords()[JointAxis::AngX as usize])
+        f64::from(link.joint.coords()[axis(robot.joints[i].kind) as usize])
     };
-    (std::array::from_fn(angle), std::array::from_fn(|i| f64::from(velocity[i])))
+    let n = robot.joints.len();
+    (Joints::from_fn(n, position), Joints::from_fn(n, |i| f64::from(velocity[i])))
 }
 
-fn insert_link(physics: &mut PhysicsWorld, link: usize) -> RigidBodyHandle {
-    let inertia = LINK_INERTIA[link];
-    let mass = MassProperties::new(vector(inertia.com_m), inertia.mass_kg as Real, vector(inertia.inertia_kg_m2));
+fn insert_link(physics: &mut PhysicsWorld, robot: &Robot, link: usize) -> RigidBodyHandle {
+    let inertia = robot.links[link].inertia;
+    let (com, principal) = (vector(inertia.com_m), vector(inertia.principal_kg_m2));
+    let mass = MassProperties::with_principal_inertia_frame(com, inertia.mass_kg as Real, principal, rotation(&inertia.axes));
     let builder = if link == 0 { RigidBodyBuilder::fixed() } else { RigidBodyBuilder::dynamic() };
     // No gravity: the real arm's controller compensates its own weight.
     let body = physics.insert_body(builder.gravity_scale(0.0).additional_mass_properties(mass).can_sleep(false));
-    for primitive in LINK_SHAPES.iter().filter(|s| s.link == link) {
-        let collider = match primitive.shape {
+    for shape in &robot.links[link].shapes {
+        let collider = match shape {
             Shape::Capsule { from_m, to_m, radius_m } => {
-                ColliderBuilder::capsule_from_endpoints(vector(from_m), vector(to_m), radius_m as Real)
+                ColliderBuilder::capsule_from_endpoints(vector(*from_m), vector(*to_m), *radius_m as Real)
             }
-            Shape::Box { center_m, half_m } => {
-                let half = vector(half_m);
-                ColliderBuilder::cuboid(half.x, half.y, half.z).translation(vector(center_m))
+            Shape::Box { pose, half_m } => {
+                let half = vector(*half_m);
+                ColliderBuilder::cuboid(half.x, half.y, half.z).position(isometry(pose))
             }
         };
         let collider = collider.density(0.0).friction(SURFACE_FRICTION).user_data(Owner::Link(link).code());
@@ -103,63 +108,66 @@ fn insert_link(physics: &mut PhysicsWorld, link: usize) -> RigidBodyHandle {
     body
 }
 
-/// Joint `i`: rapier turns about the local x axis, the Jaco about z.
-fn joint(kinematics: &Arm, i: usize) -> GenericJoint {
+/// Rapier moves about or along the local x axis, ours is z.
+fn as_rapier(joint: &Joint) -> GenericJoint {
     let z_from_x =
         Isometry3::from_parts(Vector3::zeros().into(), UnitQuaternion::from_axis_angle(&Vector3::y_axis(), -FRAC_PI_2));
-    let builder = GenericJointBuilder::new(JointAxesMask::LOCKED_REVOLUTE_AXES)
-        .local_frame1(isometry(&(kinematics.origin(i) * z_from_x)))
+    let (axis, locked) = match joint.kind {
+        JointKind::Revolute => (JointAxis::AngX, JointAxesMask::LOCKED_REVOLUTE_AXES),
+        JointKind::Prismatic => (JointAxis::LinX, JointAxesMask::LOCKED_PRISMATIC_AXES),
+    };
+    let builder = GenericJointBuilder::new(locked)
+        .local_frame1(isometry(&(joint.origin * z_from_x)))
         .local_frame2(isometry(&z_from_x))
-        .motor_model(JointAxis::AngX, MotorModel::ForceBased)
-        .motor_velocity(JointAxis::AngX, 0.0, MOTOR_GAIN)
-        .motor_max_force(JointAxis::AngX, TORQUE_LIMITS_N_M[i] as Real)
+        .motor_model(axis, MotorModel::ForceBased)
+        .motor_velocity(axis, 0.0, MOTOR_GAIN)
+        .motor_max_force(axis, joint.effort as Real)
         .contacts_enabled(false);
-    let [low, high] = POSITION_LIMITS_RAD[i];
-    if is_continuous(i) { builder.build() } else { builder.limits(JointAxis::AngX, [low as Real, high as Real]).build() }
-}
-
-/// Whether joint `i` turns without limit.
-fn is_continuous(i: usize) -> bool {
-    let [low, high] = POSITION_LIMITS_RAD[i];
-    high - low > TAU
+    let limits = joint.limits.map(|limit| limit as Real);
+    if joint.continuous { builder.build() } else { builder.limits(axis, limits).build() }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::robot::READY_Q_RAD;
+    use crate::robot::file::built_in::all;
 
-    /// A new multibody has 15 rows, six of which vanish with its first pass: what was set earlier would sit on the wrong joints.
+    /// A new multibody has six rows more, which vanish with its first pass: what was set earlier would sit on the wrong joints.
     #[test]
     fn motors_armature_damping_and_friction_sit_on_their_joints() {
-        let mut physics = PhysicsWorld::new();
-        let handle = insert(&mut physics, &READY_Q_RAD, &[0.0; JOINTS]);
-        let action = std::array::from_fn(|i| 0.01 * i as f64);
-        command(&mut physics, handle, &action);
-        physics.step();
-        let multibody = physics.multibody_joints.get(handle).expect("inserted above").0;
-        for i in 0..JOINTS {
-            let kind = usize::from(i >= ARM_JOINTS);
-            assert_eq!(multibody.armature()[i], ARMATURE_KG_M2[kind], "armature of joint {i}");
-            assert_eq!(multibody.damping()[i], DAMPING_N_M_S[kind], "damping of joint {i}");
-            assert_eq!(multibody.frictions()[i], DRY_FRICTION_N_M[kind], "friction of joint {i}");
-            let joint = &multibody.link(i + 1).expect("ten links").joint.data;
-            let motor = joint.motor(JointAxis::AngX).expect("each joint has a motor");
-            assert_eq!(motor.max_force, TORQUE_LIMITS_N_M[i] as Real, "torque limit of joint {i}");
-            assert_eq!(motor.target_vel, action[i] as Real, "command of joint {i}");
+        for robot in all() {
+            let mut physics = PhysicsWorld::new();
+            let n = robot.joints.len();
+            let handle = insert(&mut physics, &robot, &robot.ready, &Joints::zeros(n));
+            let action = Joints::from_fn(n, |i| 0.01 * i as f64);
+            command(&mut physics, &robot, handle, &action);
+            physics.step();
+            let multibody = physics.multibody_joints.get(handle).expect("inserted above").0;
+            for (i, ours) in robot.joints.iter().enumerate() {
+                let expected = [ours.motor.armature, ours.motor.damping, ours.motor.friction].map(|v| v as Real);
+                let found = [multibody.armature()[i], multibody.damping()[i], multibody.frictions()[i]];
+                assert_eq!(found, expected, "{}", ours.name);
+                let joint = &multibody.link(i + 1).expect("a link").joint.data;
+                let motor = joint.motor(axis(ours.kind)).expect("each joint has a motor");
+                assert_eq!(motor.max_force, ours.effort as Real, "{}", ours.name);
+                assert_eq!(motor.target_vel, action[i] as Real, "{}", ours.name);
+            }
         }
     }
 
     #[test]
     fn rapier_and_our_kinematics_agree_on_every_link() {
-        let mut physics = PhysicsWorld::new();
-        let q = READY_Q_RAD.map(|v| v + 0.2);
-        let handle = insert(&mut physics, &q, &[0.0; JOINTS]);
-        let multibody = physics.multibody_joints.get(handle).expect("inserted above").0;
-        for (link, ours) in multibody.links().zip(Arm::new().link_poses(&q)) {
-            let theirs = crate::sim::convert::to_pose(physics.bodies[link.rigid_body_handle()].position()).isometry();
-            let apart = (theirs.translation.vector - ours.translation.vector).norm() + theirs.rotation.angle_to(&ours.rotation);
-            assert!(apart < 1e-4, "link {} differs by {apart}", link.link_id());
+        for robot in all() {
+            let mut physics = PhysicsWorld::new();
+            let q = Joints::from_fn(robot.joints.len(), |i| robot.ready[i] + 0.2 * robot.joints[i].per_radian());
+            let handle = insert(&mut physics, &robot, &q, &Joints::zeros(q.len()));
+            let multibody = physics.multibody_joints.get(handle).expect("inserted above").0;
+            for (link, ours) in multibody.links().zip(robot.link_poses(&q)) {
+                let theirs = crate::sim::convert::to_pose(physics.bodies[link.rigid_body_handle()].position()).isometry();
+                let apart =
+                    (theirs.translation.vector - ours.translation.vector).norm() + theirs.rotation.angle_to(&ours.rotation);
+                assert!(apart < 1e-4, "{}: link {} differs by {apart}", robot.name, link.link_id());
+            }
         }
     }
 }

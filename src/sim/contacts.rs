@@ -1,7 +1,7 @@
 //! What touches what, and how hard.
 
 use crate::demo::Contacts;
-use crate::robot::jaco::HAND_LINK;
+use crate::robot::Robot;
 use rapier3d::parry::bounding_volume::BoundingVolume;
 use rapier3d::prelude::{Collider, ContactPair, PhysicsWorld, Pose};
 
@@ -47,16 +47,16 @@ impl Owner {
 }
 
 /// Reads all contacts of the last physics step.
-pub(super) fn read(physics: &PhysicsWorld) -> Contacts {
-    let mut contacts = Contacts::default();
+pub(super) fn read(physics: &PhysicsWorld, robot: &Robot) -> Contacts {
+    let (mut contacts, hand) = (Contacts::none(robot.fingers().len()), robot.hand());
     for pair in physics.contact_pairs() {
         let [one, other] = [pair.collider1, pair.collider2].map(|h| &physics.colliders[h]);
         if force_n(pair, physics) <= 0.0 && separation(pair, one.position(), other.position()) > TOUCH_M {
             continue;
         }
         match ordered(Owner::of(one), Owner::of(other)) {
-            (Owner::Link(link), Owner::Block) if link > HAND_LINK => {
-                contacts.finger_block_n[link - HAND_LINK - 1] += force_n(pair, physics)
+            (Owner::Link(link), Owner::Block) if link > hand => {
+                contacts.finger_block_n[link - hand - 1] += force_n(pair, physics)
             }
             (Owner::Link(_), Owner::Obstacle) => contacts.robot_obstacle = true,
             (Owner::Link(_), Owner::Table) => contacts.robot_table = true,

@@ -1,12 +1,18 @@
 //! Our nalgebra poses in f64 to and from rapier's glam poses in f32.
 
 use crate::state::Pose;
-use nalgebra::Isometry3;
+use nalgebra::{Isometry3, UnitQuaternion};
 use rapier3d::math::{Pose as RapierPose, Real, Rotation, Vector};
 
 /// A vector in rapier's precision.
 pub(super) fn vector(v: [f64; 3]) -> Vector {
     Vector::new(v[0] as Real, v[1] as Real, v[2] as Real)
+}
+
+/// A rotation in rapier's precision.
+pub(super) fn rotation(turn: &UnitQuaternion<f64>) -> Rotation {
+    let [x, y, z, w]: [Real; 4] = turn.coords.map(|v| v as Real).into();
+    Rotation::from_xyzw(x, y, z, w).normalize()
 }
 
 /// A pose in rapier's precision.

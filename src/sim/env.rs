@@ -7,15 +7,19 @@ use crate::config::{Pipeline, PulseSettings, RewardKind, SceneSettings, Simulate
 use crate::env::{End, Env, Outcome};
 use crate::error::{Error, Result};
 use crate::guard::guarded;
+use crate::joints::Joints;
+use crate::robot::Robot;
 use crate::scene::Scene;
 use crate::seed::stream;
-use crate::state::JOINTS;
 use crate::tasks::{Monitor, Observation, Task, dense, draw_scene};
+use std::sync::Arc;
 
 /// A task in contact physics. Scenes come from the random stream `train.ppo.scene`, the noise on the commands from `train.ppo.noise`: no
 /// demonstration, selection or evaluation has them. There are no pulses, as in an evaluation.
 pub struct TaskEnv {
+    robot: Arc<Robot>,
     task: Task,
+    observation_len: usize,
     scene: SceneSettings,
     noise: SimulateSettings,
     reward: RewardKind,
@@ -37,9 +41,12 @@ struct Running {
 impl TaskEnv {
     /// As `[scene]`, `[simulate]` and gamma of `[train.ppo]` have it; episodes are cut off after `horizon_steps`.
     pub fn new(pipeline: &Pipeline, reward: RewardKind, horizon_steps: u32, seed: u64) -> Self {
+        let robot = &pipeline.robot;
         let pulses = PulseSettings { probability: 0.0, ..pipeline.simulate.pulses.clone() };
         TaskEnv {
+            robot: Arc::clone(robot),
             task: pipeline.task,
+            observation_len: pipeline.task.layout(robot).state_dim(),
             scene: pipeline.scene.clone(),
             noise: SimulateSettings { pulses, ..pipeline.simulate.clone() },
             reward,
@@ -53,15 +60,15 @@ impl TaskEnv {
 
 impl Env for TaskEnv {
     fn observation_len(&self) -> usize {
-        self.task.state_dim()
+        self.observation_len
     }
 
     fn action_len(&self) -> usize {
-        JOINTS
+        self.robot.joints.len()
     }
 
     fn reset(&mut self, episode: u64, observation: &mut [f32]) -> Result<()> {
-        let scene = draw_scene(self.task, &self.scene, &mut stream(self.seed, "train.ppo.scene", episode))?;
+        let scene = draw_scene(&self.robot, self.task, &self.scene, &mut stream(self.seed, "train.ppo.scene", episode))?;
         let begun = guarded(|| {
             let mut world = World::new(&scene);
             let first = world.observe();
@@ -74,7 +81,7 @@ impl Env for TaskEnv {
         let mut monitor = Monitor::new(&scene);
         monitor.update(&first);
         observation.copy_from_slice(&first.state.to_row());
-        let disturbance = Disturbance::new(&self.noise, stream(self.seed, "train.ppo.noise", episode));
+        let disturbance = Disturbance::new(&self.robot, &self.noise, stream(self.seed, "train.ppo.noise", episode));
         self.running = Some(Running { scene, world, monitor, disturbance, steps: 0 });
         Ok(())
     }
@@ -101,7 +108,7 @@ impl Running {
     /// One control step; `None` when the simulation breaks down.
     fn step(&mut self, action: &[f32]) -> Option<Observation> {
         self.steps += 1;
-        let commanded = std::array::from_fn(|i| f64::from(action[i]));
+        let commanded: Joints = action.iter().map(|v| f64::from(*v)).collect();
         let executed = self.disturbance.apply(&commanded);
         let seen = guarded(|| {
             self.world.step(&executed);
@@ -136,7 +143,7 @@ mod tests {
         let mut run = |episode: u64| {
             let (mut seen, mut all) = (begin(&mut env, episode), Vec::new());
             loop {
-                let action: Vec<f32> = (0..JOINTS).map(|i| 0.1 * ((all.len() + i) % 7) as f32 - 0.3).collect();
+                let action: Vec<f32> = (0..9).map(|i| 0.1 * ((all.len() + i) % 7) as f32 - 0.3).collect();
                 let outcome = env.step(&action, &mut seen);
                 all.push((seen.clone(), outcome));
                 if outcome.end.is_some() {
@@ -155,12 +162,13 @@ mod tests {
         let mut env = env(|pipeline| pipeline.train.ppo.reward = reward);
         let mut seen = begin(&mut env, 0);
         let scene = env.running.as_ref().expect("begun").scene.clone();
-        let plan = Planner::new(&Pipeline::defaults(Task::PickUp).plan).plan(0, &scene, &mut stream(0, "env test", 0));
+        let plan =
+            Planner::new(&scene.robot, &Pipeline::defaults(Task::PickUp).plan).plan(0, &scene, &mut stream(0, "env test", 0));
         let mut follower = Follower::new(&plan.expect("a plan")).expect("a follower");
         let mut sum = 0.0;
         loop {
             let now = env.running.as_mut().expect("begun").world.observe();
-            let outcome = env.step(&follower.command(&now).map(|v| v as f32), &mut seen);
+            let outcome = env.step(&follower.command(&now).iter().map(|v| *v as f32).collect::<Vec<f32>>(), &mut seen);
             sum += f64::from(outcome.reward);
             if let Some(end) = outcome.end {
                 assert!(outcome.success && end == End::Terminated, "the demonstrator fails");
@@ -186,7 +194,7 @@ mod tests {
         });
         let mut seen = begin(&mut wall, 0);
         let ends = (0..20).find_map(|_| {
-            let outcome = wall.step(&[0.0; JOINTS], &mut seen);
+            let outcome = wall.step(&[0.0; 9], &mut seen);
             outcome.end.map(|end| (end, outcome.reward, outcome.success))
         });
         assert_eq!(ends, Some((End::Terminated, 0.0, false)));

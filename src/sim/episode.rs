@@ -6,14 +6,15 @@ use crate::demo::{Contacts, Episode, LARGEST_NUMBER, Phase, Step};
 use crate::error::Result;
 use crate::guard::guarded;
 use crate::interrupt::Interrupt;
-use crate::robot::{Arm, READY_Q_RAD};
+use crate::joints::Joints;
 use crate::scene::Scene;
-use crate::state::{Action, Context, JOINTS, State};
+use crate::state::{Action, Context, State};
 use crate::tasks::{FailureClass, Monitor, Observation, Verdict};
+use std::sync::Arc;
 
 /// Decides the command of each control step: the plan follower, or a learned policy.
 pub trait Controller {
-    /// Joint velocities to ask for \[rad/s\], given what is seen.
+    /// Joint velocities to ask for \[rad/s, m/s\], given what is seen.
     fn command(&mut self, seen: &Observation) -> Action;
 
     /// The part of the plan that the last command belongs to, if there is a plan.
@@ -43,7 +44,8 @@ pub fn run_episode(
         End::NoCommand => Some(FailureClass::CommandNotFinite),
         End::BrokenDown => Some(FailureClass::SimulationBrokeDown),
     };
-    let last = record(&run.seen, &run.verdict, [0.0; JOINTS], [0.0; JOINTS], None);
+    let still = Joints::zeros(scene.robot.joints.len());
+    let last = record(&run.seen, &run.verdict, still, still, None);
     Ok(Episode { index, scene: scene.clone(), steps: run.steps, last, success, failure })
 }
 
@@ -113,11 +115,13 @@ impl<'a> Run<'a> {
 
 /// What there is to see before the first contact is known: the arm in its ready pose, the blocks where the scene has them.
 fn at_rest(scene: &Scene) -> Observation {
+    let robot = &scene.robot;
     Observation {
-        state: State { q_rad: READY_Q_RAD, dq_rad_s: [0.0; JOINTS], block: scene.block, context: scene.context },
-        tool_m: Arm::new().tool_pose(&READY_Q_RAD).translation.vector.into(),
+        robot: Arc::clone(robot),
+        state: State { q: robot.ready, dq: Joints::zeros(robot.joints.len()), block: scene.block, context: scene.context },
+        tool_m: robot.tool_pose(&robot.ready).translation.vector.into(),
         base_now: if let Context::Base(base) = scene.context { Some(base) } else { None },
-        contacts: Contacts::default(),
+        contacts: Contacts::none(robot.fingers().len()),
         block_speed_m_s: 0.0,
     }
 }
@@ -146,7 +150,7 @@ pub(super) fn fallen(seen: &Observation) -> bool {
 pub(super) fn sound(seen: &Observation) -> bool {
     let state = &seen.state;
     let base = seen.base_now.map_or([0.0; 7], |b| b.to_array());
-    let motion = state.q_rad.iter().chain(&state.dq_rad_s).copied();
+    let motion = state.q.iter().chain(&state.dq).copied();
     let motion = motion.chain(state.block.to_array()).chain(base).chain([seen.block_speed_m_s]);
     motion.into_iter().all(|v| v.abs() <= LARGEST_NUMBER) && seen.contacts.finger_block_n.iter().all(|f| f.is_finite())
 }

@@ -5,12 +5,13 @@
 
 use super::Controller;
 use crate::demo::Phase;
+use crate::joints::Joints;
 use crate::plan::Plan;
-use crate::robot::jaco::{POSITION_LIMITS_RAD, PRESHAPE_RAD, VELOCITY_LIMITS_RAD_S};
-use crate::robot::kinematics::Arm;
-use crate::state::{ARM_JOINTS, Action, CONTROL_DT_S, JOINTS};
+use crate::robot::Robot;
+use crate::state::{Action, CONTROL_DT_S};
 use crate::tasks::Observation;
 use nalgebra::{Matrix6, Vector3, Vector6};
+use std::sync::Arc;
 
 /// The arm steers towards the plan's point this many samples ahead of the one reached (0.3 s): the feedback gain is 1 / 0.3 s.
 const LOOK_AHEAD: usize = 6;
@@ -34,28 +35,27 @@ const CLOSE_Z_M: f64 = 0.004;
 const OPEN_XY_M: f64 = 0.008;
 /// ... and this little above it \[m\].
 const OPEN_Z_M: f64 = 0.004;
-/// Finger speed while closing, holding and opening \[rad/s\].
-const FINGER_RAD_S: f64 = 0.8;
-/// The grip is firm when the fingers move slower than this \[rad/s\].
-const STALLED_RAD_S: f64 = 0.15;
-/// The hand is open when every finger is below this angle \[rad\].
-const OPENED_RAD: f64 = PRESHAPE_RAD + 0.02;
+/// The grip is firm when the fingers move slower than this share of the speed with which they close.
+const STALLED: f64 = 0.1875;
+/// The hand is open when every finger is this near to its place in the open hand \[rad, and what counts as one\].
+const OPENED_RAD: f64 = 0.02;
 /// Damping of the Jacobian's inverse \[m/rad\]: bounds joint speeds near singular poses.
 const DAMPING: f64 = 0.02;
 
 /// The samples of one phase with the tool's path.
 #[derive(Clone, Debug)]
 struct Segment {
-    q: Vec<[f64; JOINTS]>,
+    q: Vec<Joints>,
     tool_m: Vec<Vector3<f64>>,
     /// Path length from the segment's start \[m\].
     arc_m: Vec<f64>,
 }
 
 impl Segment {
-    fn new(plan: &Plan, phase: Phase, arm: &Arm) -> Option<Self> {
-        let q: Vec<_> = plan.waypoints.iter().filter(|w| w.phase == phase).map(|w| w.q_rad).collect();
-        let tool_m: Vec<Vector3<f64>> = q.iter().map(|q| arm.tool_pose(q).translation.vector).collect();
+    fn new(plan: &Plan, phase: Phase) -> Option<Self> {
+        let robot = &plan.scene.robot;
+        let q: Vec<_> = plan.waypoints.iter().filter(|w| w.phase == phase).map(|w| w.q).collect();
+        let tool_m: Vec<Vector3<f64>> = q.iter().map(|q| robot.tool_pose(q).translation.vector).collect();
         let mut arc_m = Vec::with_capacity(q.len());
         for (i, p) in tool_m.iter().enumerate() {
             arc_m.push(if i == 0 { 0.0 } else { arc_m[i - 1] + (p - tool_m[i - 1]).norm() });
@@ -87,7 +87,7 @@ impl Segment {
 /// Follows one plan.
 #[derive(Clone, Debug)]
 pub struct Follower {
-    arm: Arm,
+    robot: Arc<Robot>,
     approach: Segment,
     carry: Segment,
     retreat: Option<Segment>,
@@ -102,13 +102,13 @@ pub struct Follower {
 impl Follower {
     /// A follower at the start of `plan`; `None` if the plan lacks a phase that its task needs.
     pub fn new(plan: &Plan) -> Option<Self> {
-        let arm = Arm::new();
-        let approach = Segment::new(plan, Phase::Approach, &arm)?;
-        let carry = Segment::new(plan, Phase::Carry, &arm)?;
-        let retreat = Segment::new(plan, Phase::Retreat, &arm);
+        let robot = Arc::clone(&plan.scene.robot);
+        let approach = Segment::new(plan, Phase::Approach)?;
+        let carry = Segment::new(plan, Phase::Carry)?;
+        let retreat = Segment::new(plan, Phase::Retreat);
         let block_from_tool_m = Vector3::from(plan.scene.block.position_m) - carry.tool_m[0];
         let release_m = retreat.is_some().then(|| Vector3::from(plan.scene.target_m()));
-        Some(Follower { arm, approach, carry, retreat, block_from_tool_m, release_m, phase: Phase::Approach, reached: 0 })
+        Some(Follower { robot, approach, carry, retreat, block_from_tool_m, release_m, phase: Phase::Approach, reached: 0 })
     }
 
     fn enter(&mut self, phase: Phase) {
@@ -119,7 +119,6 @@ impl Follower {
     /// Moves on to the next phase when the state says so.
     fn switch(&mut self, seen: &Observation) {
         let tool = Vector3::from(seen.tool_m);
-        let fingers = |of: &[f64; JOINTS]| [of[6], of[7], of[8]];
         match self.phase {
             Phase::Approach => {
                 let off = tool - self.approach.tool_m[self.approach.last()];
@@ -128,7 +127,8 @@ impl Follower {
                 }
             }
             Phase::Close => {
-                if seen.gripped() && fingers(&seen.state.dq_rad_s).iter().all(|v| v.abs() < STALLED_RAD_S) {
+                let stalled = STALLED * self.robot.finger_speed;
+                if seen.gripped() && seen.state.dq[self.robot.arm..].iter().all(|v| v.abs() < stalled) {
                     self.enter(Phase::Carry);
                 }
             }
@@ -139,7 +139,7 @@ impl Follower {
                 }
             }
             Phase::Open => {
-                if fingers(&seen.state.q_rad).iter().all(|q| *q < OPENED_RAD) {
+                if self.is_open(&seen.state.q) {
                     self.enter(Phase::Retreat);
                 }
             }
@@ -147,21 +147,32 @@ impl Follower {
         }
     }
 
-    /// Arm command towards the plan, the tool's target shifted by `shift_m`.
-    fn steer(&self, segment: &Segment, from: usize, q: &[f64; JOINTS], shift_m: &Vector3<f64>) -> [f64; ARM_JOINTS] {
+    /// Whether every finger is back where it is in the open hand, or beyond.
+    fn is_open(&self, q: &Joints) -> bool {
+        let robot = &self.robot;
+        robot.fingers().enumerate().all(|(i, joint)| {
+            let left = (q[joint] - robot.ready[joint]) * robot.closing_way(i).signum();
+            left < OPENED_RAD * robot.joints[joint].per_radian()
+        })
+    }
+
+    /// Command of the arm towards the plan, the tool's target shifted by `shift_m`.
+    fn steer(&self, segment: &Segment, from: usize, q: &Joints, shift_m: &Vector3<f64>) -> Joints {
         let ahead = &segment.q[(from + LOOK_AHEAD).min(segment.last())];
-        let (_, jacobian) = self.arm.tool_jacobian(q);
+        let (_, jacobian) = self.robot.tool_jacobian(q);
         let shift = Vector6::new(shift_m.x, shift_m.y, shift_m.z, 0.0, 0.0, 0.0);
-        let damped = jacobian * jacobian.transpose() + Matrix6::identity() * (DAMPING * DAMPING);
-        let joints = damped.cholesky().map_or(Vector6::zeros(), |c| jacobian.transpose() * c.solve(&shift));
-        std::array::from_fn(|i| GAIN_PER_S * (ahead[i] - q[i] + joints[i]))
+        let mut damped = Matrix6::zeros();
+        jacobian.column_iter().for_each(|column| damped.ger(1.0, &column, &column, 1.0));
+        damped += Matrix6::identity() * (DAMPING * DAMPING);
+        let forces = damped.cholesky().map_or(Vector6::zeros(), |c| c.solve(&shift));
+        Joints::from_fn(self.robot.arm, |i| GAIN_PER_S * (ahead[i] - q[i] + jacobian.column(i).dot(&forces)))
     }
 }
 
 impl Controller for Follower {
     fn command(&mut self, seen: &Observation) -> Action {
         self.switch(seen);
-        let q = &seen.state.q_rad;
+        let q = &seen.state.q;
         let tool = Vector3::from(seen.tool_m);
         let still = Vector3::zeros();
         let arm = match self.phase {
@@ -178,27 +189,27 @@ impl Controller for Follower {
                 let from = if self.release_m.is_some() { self.carry.funnel(self.reached, &virtual_tool) } else { self.reached };
                 self.steer(&self.carry, from, q, &(tool - virtual_tool))
             }
-            Phase::Open => [0.0; ARM_JOINTS],
+            Phase::Open => Joints::zeros(self.robot.arm),
             Phase::Retreat => match &self.retreat {
                 Some(retreat) => {
                     self.reached = retreat.project(&tool, self.reached);
                     self.steer(retreat, self.reached, q, &still)
                 }
-                None => [0.0; ARM_JOINTS],
+                None => Joints::zeros(self.robot.arm),
             },
         };
-        let finger = |angle: f64| match self.phase {
-            Phase::Approach | Phase::Retreat => GAIN_PER_S * (PRESHAPE_RAD - angle),
-            Phase::Close | Phase::Carry => FINGER_RAD_S,
-            Phase::Open => -FINGER_RAD_S,
+        let robot = &self.robot;
+        let finger = |joint: usize| {
+            let closing = robot.finger_speed * robot.closing_way(joint - robot.arm).signum();
+            match self.phase {
+                Phase::Approach | Phase::Retreat => GAIN_PER_S * (robot.ready[joint] - q[joint]),
+                Phase::Close | Phase::Carry => closing,
+                Phase::Open => -closing,
+            }
         };
-        std::array::from_fn(|i| {
-            let command = if i < ARM_JOINTS { arm[i] } else { finger(q[i]) };
-            let [low, high] = POSITION_LIMITS_RAD[i];
-            // Never ask for more than the joint has left in this step.
-            let (slowest, fastest) = ((low - q[i]) / CONTROL_DT_S, (high - q[i]) / CONTROL_DT_S);
-            let limit = VELOCITY_LIMITS_RAD_S[i];
-            command.clamp(-limit, limit).clamp(slowest.min(0.0), fastest.max(0.0))
+        Joints::from_fn(q.len(), |i| {
+            let command = if i < robot.arm { arm[i] } else { finger(i) };
+            robot.joints[i].within_limits(command, q[i], CONTROL_DT_S)
         })
     }
 

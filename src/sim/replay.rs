@@ -6,25 +6,32 @@ use crate::config::{FingerPulses, SceneSettings, SimulateSettings};
 use crate::demo::{Demo, Episode};
 use crate::error::Result;
 use crate::interrupt::Interrupt;
+use crate::joints::Joints;
 use crate::pulse::Pulse;
+use crate::robot::Robot;
 use crate::scene::Scene;
 use crate::seed::stream;
-use crate::state::{ARM_JOINTS, Action, FINGERS, JOINTS, State};
+use crate::state::{Action, State};
 use crate::tasks::{Observation, Task};
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
+use std::sync::Arc;
 
 /// Plays a demo's commands, then stands still.
 struct Replay<'a> {
+    robot: &'a Robot,
     commands: std::slice::ChunksExact<'a, f32>,
     fingers: Option<Excitation<'a>>,
 }
 
 impl Controller for Replay<'_> {
     fn command(&mut self, _seen: &Observation) -> Action {
-        let mut command = self.commands.next().map_or([0.0; JOINTS], |c| std::array::from_fn(|i| f64::from(c[i])));
+        let still = Joints::zeros(self.robot.joints.len());
+        let mut command: Action = self.commands.next().map_or(still, |c| c.iter().map(|v| f64::from(*v)).collect());
         if let Some(speeds) = self.fingers.as_mut().and_then(Excitation::advance) {
-            command[ARM_JOINTS..].copy_from_slice(speeds);
+            let fingers = &self.robot.joints[self.robot.arm..];
+            let scaled = speeds.iter().zip(fingers).map(|(speed, joint)| speed * joint.per_radian());
+            command[self.robot.arm..].iter_mut().zip(scaled).for_each(|(command, speed)| *command = speed);
         }
         command
     }
@@ -45,22 +52,23 @@ impl Excitation<'_> {
     }
 }
 
-/// Runs the commands of a demo of `task` from its start under disturbances drawn from `rng`, for as many steps as the demo has, now and then with
+/// Runs the commands of a demo of a robot in a task from its start under disturbances drawn from `rng`, for as many steps as the demo has, now and then with
 /// other commands for the `fingers`. Friction and mass are drawn anew and obstacles taken from the settings: a dataset does not hold them.
 ///
 /// # Errors
 /// [`crate::error::Error::Interrupted`].
 pub fn reexecute(
     index: u64,
-    (task, demo): (Task, &Demo),
+    (robot, task, demo): (&Arc<Robot>, Task, &Demo),
     scene: &SceneSettings,
     settings: &SimulateSettings,
     fingers: &FingerPulses,
     mut rng: ChaCha8Rng,
     interrupt: &Interrupt,
 ) -> Result<Episode> {
-    let start = State::from_row(task, demo.state(0)).expect("a demo of the task has rows of its length");
+    let start = State::from_row(task, robot.joints.len(), demo.state(0)).expect("a demo of the task has rows of its length");
     let scene = Scene {
+        robot: Arc::clone(robot),
         task,
         block: start.block,
         context: start.context,
@@ -70,12 +78,12 @@ pub fn reexecute(
     };
     let excitation = || {
         let rng = stream(rng.random(), "reexecute.fingers", index);
-        Excitation { settings: fingers, rng, pulse: Pulse::new(FINGERS) }
+        Excitation { settings: fingers, rng, pulse: Pulse::new(robot.fingers().len()) }
     };
     let fingers = (fingers.probability > 0.0).then(excitation);
-    let mut replay = Replay { commands: demo.actions().chunks_exact(JOINTS), fingers };
+    let mut replay = Replay { robot, commands: demo.actions().chunks_exact(robot.joints.len()), fingers };
     let steps = u32::try_from(demo.len()).unwrap_or(u32::MAX);
-    run_episode(index, &scene, &mut replay, &mut Disturbance::new(settings, rng), steps, interrupt)
+    run_episode(index, &scene, &mut replay, &mut Disturbance::new(robot, settings, rng), steps, interrupt)
 }
 
 #[cfg(test)]
@@ -83,29 +91,34 @@ mod tests {
     use super::*;
     use crate::config::PulseSettings;
     use crate::math::sin_cos;
+    use crate::robot::file::built_in::paper_robot;
     use crate::scene::Obstacle;
     use crate::sim::World;
     use crate::tasks::{FailureClass, draw_scene};
 
+    /// Joints of the paper's robot, and of its arm.
+    const DIM: usize = 9;
+    const ARM: usize = 6;
+
     #[test]
     fn commands_without_noise_lead_where_they_led_and_with_noise_elsewhere() {
         let settings = SceneSettings::default();
-        let scene = draw_scene(Task::Stack, &settings, &mut stream(3, "scene", 0)).expect("there is room");
+        let scene = draw_scene(&paper_robot(), Task::Stack, &settings, &mut stream(3, "scene", 0)).expect("there is room");
         let mut world = World::new(&scene);
         let mut states = world.observe().state.to_row();
         let actions: Vec<f32> =
-            (0..15).flat_map(|t| (0..JOINTS).map(move |i| 0.2 * sin_cos((t + i) as f64 / 3.0).0 as f32)).collect();
-        for action in actions.chunks_exact(JOINTS) {
-            world.step(&std::array::from_fn(|i| f64::from(action[i])));
+            (0..15).flat_map(|t| (0..DIM).map(move |i| 0.2 * sin_cos((t + i) as f64 / 3.0).0 as f32)).collect();
+        for action in actions.chunks_exact(DIM) {
+            world.step(&action.iter().map(|v| f64::from(*v)).collect());
             states.extend(world.observe().state.to_row());
         }
-        let demo = Demo::new(&Task::Stack.layout(), states, actions.clone(), actions).expect("lengths match");
+        let demo = Demo::new(&Task::Stack.layout(&paper_robot()), states, actions.clone(), actions).expect("lengths match");
         let again = |noise_variance: f64| {
             let off = PulseSettings { probability: 0.0, ..PulseSettings::default() };
             let noise = SimulateSettings { noise_variance, pulses: off, ..SimulateSettings::default() };
             let episode = reexecute(
                 0,
-                (Task::Stack, &demo),
+                (&paper_robot(), Task::Stack, &demo),
                 &settings,
                 &noise,
                 &FingerPulses::default(),
@@ -124,14 +137,15 @@ mod tests {
     fn a_demo_whose_execution_breaks_down_is_no_panic() {
         let touching = Obstacle { center_m: [0.0, 0.0, 0.3], size_m: [0.02; 3] };
         let settings = SceneSettings { obstacles: vec![touching], ..SceneSettings::default() };
-        let scene = draw_scene(Task::PickUp, &SceneSettings::default(), &mut stream(3, "scene", 0)).expect("there is room");
+        let scene = draw_scene(&paper_robot(), Task::PickUp, &SceneSettings::default(), &mut stream(3, "scene", 0))
+            .expect("there is room");
         let start = World::new(&scene).observe().state.to_row();
         const STEPS: usize = 100;
-        let (states, still) = (start.repeat(STEPS + 1), vec![0.0; STEPS * JOINTS]);
-        let demo = Demo::new(&Task::PickUp.layout(), states, still.clone(), still).expect("lengths match");
+        let (states, still) = (start.repeat(STEPS + 1), vec![0.0; STEPS * DIM]);
+        let demo = Demo::new(&Task::PickUp.layout(&paper_robot()), states, still.clone(), still).expect("lengths match");
         let episode = reexecute(
             0,
-            (Task::PickUp, &demo),
+            (&paper_robot(), Task::PickUp, &demo),
             &settings,
             &SimulateSettings::default(),
             &FingerPulses::default(),
@@ -144,24 +158,32 @@ mod tests {
     #[test]
     fn excited_fingers_get_other_commands_and_the_arm_the_demos() {
         let settings = SceneSettings::default();
-        let scene = draw_scene(Task::PickUp, &settings, &mut stream(3, "scene", 0)).expect("there is room");
+        let scene = draw_scene(&paper_robot(), Task::PickUp, &settings, &mut stream(3, "scene", 0)).expect("there is room");
         const STEPS: usize = 60;
         let states = World::new(&scene).observe().state.to_row().repeat(STEPS + 1);
-        let actions: Vec<f32> = (0..STEPS * JOINTS).map(|i| 0.01 * (i % JOINTS) as f32).collect();
-        let demo = Demo::new(&Task::PickUp.layout(), states, actions.clone(), actions.clone()).expect("lengths match");
+        let actions: Vec<f32> = (0..STEPS * DIM).map(|i| 0.01 * (i % DIM) as f32).collect();
+        let demo =
+            Demo::new(&Task::PickUp.layout(&paper_robot()), states, actions.clone(), actions.clone()).expect("lengths match");
         let executed = |fingers: &FingerPulses, index: u64| -> Vec<f32> {
             let noise = SimulateSettings { noise_variance: 0.0, ..SimulateSettings::default() };
-            let episode =
-                reexecute(index, (Task::PickUp, &demo), &settings, &noise, fingers, stream(4, "noise", 0), &Interrupt::default());
+            let episode = reexecute(
+                index,
+                (&paper_robot(), Task::PickUp, &demo),
+                &settings,
+                &noise,
+                fingers,
+                stream(4, "noise", 0),
+                &Interrupt::default(),
+            );
             episode.expect("not interrupted").to_demo().expect("a demo").executed().to_vec()
         };
         assert_eq!(executed(&FingerPulses::default(), 0), actions);
         let fingers = FingerPulses { probability: 0.2, ..FingerPulses::default() };
         let (excited, mut changed) = (executed(&fingers, 0), 0);
-        for (excited, demo) in excited.chunks(JOINTS).zip(actions.chunks(JOINTS)) {
-            assert_eq!(excited[..ARM_JOINTS], demo[..ARM_JOINTS]);
-            assert!(excited[ARM_JOINTS..].iter().all(|speed| speed.abs() <= fingers.speed_rad_s as f32), "{excited:?}");
-            changed += usize::from(excited[ARM_JOINTS..] != demo[ARM_JOINTS..]);
+        for (excited, demo) in excited.chunks(DIM).zip(actions.chunks(DIM)) {
+            assert_eq!(excited[..ARM], demo[..ARM]);
+            assert!(excited[ARM..].iter().all(|speed| speed.abs() <= fingers.speed_rad_s as f32), "{excited:?}");
+            changed += usize::from(excited[ARM..] != demo[ARM..]);
         }
         // A pulse of three steps begins in a fifth of the steps outside of one.
         assert!((STEPS / 8..STEPS * 3 / 4).contains(&changed), "{changed} of {STEPS} steps");

@@ -5,13 +5,15 @@ use super::contacts::{self, Owner};
 use super::convert::{pose, to_pose, vector};
 use super::physics::{Grain, Physics};
 use crate::error::{Error, Result};
-use crate::robot::kinematics::tool_of;
-use crate::robot::{Arm, LinkPoses, READY_Q_RAD};
+use crate::joints::Joints;
+use crate::robot::Robot;
 use crate::scene::{BLOCK_EDGE_M, Scene};
-use crate::state::{Action, Context, JOINTS, Pose, State};
+use crate::state::{Action, Context, Pose, State};
 use crate::tasks::Observation;
+use nalgebra::Isometry3;
 use rapier3d::prelude::*;
 use serde::{Deserialize, Serialize};
+use std::sync::Arc;
 
 /// Gravity \[m/s^2\].
 const GRAVITY_M_S2: Real = 9.81;
@@ -23,16 +25,15 @@ const REST_M_S: Real = 0.005;
 /// The simulated scene. Stepping it depends on nothing but its own state and the actions.
 #[derive(Serialize, Deserialize)]
 pub struct World {
+    robot: Arc<Robot>,
     scene: Scene,
     settings: Physics,
     physics: PhysicsWorld,
-    robot: MultibodyJointHandle,
+    handle: MultibodyJointHandle,
     block: RigidBodyHandle,
     base: Option<RigidBodyHandle>,
     /// Quaternion x y z w of the last observed block: the next keeps its sign.
     block_quaternion: [f64; 4],
-    #[serde(skip)]
-    kinematics: Arm,
 }
 
 impl World {
@@ -43,7 +44,12 @@ impl World {
 
     /// The same under other settings of the physics.
     pub fn with(scene: &Scene, settings: Physics) -> World {
-        let start = State { q_rad: READY_Q_RAD, dq_rad_s: [0.0; JOINTS], block: scene.block, context: scene.context };
+        let start = State {
+            q: scene.robot.ready,
+            dq: Joints::zeros(scene.robot.joints.len()),
+            block: scene.block,
+            context: scene.context,
+        };
         World::at(scene, &start, settings)
     }
 
@@ -60,25 +66,25 @@ impl World {
             Context::Base(base) => Some(insert_cube(&mut physics, Owner::Base, &base, scene)),
             Context::None | Context::Goal(_) => None,
         };
-        let robot = arm::insert(&mut physics, &state.q_rad, &state.dq_rad_s);
+        let handle = arm::insert(&mut physics, &scene.robot, &state.q, &state.dq);
         // A step of no duration finds the contacts and moves nothing.
         physics.step();
         physics.integration_parameters = settings.parameters(settings.near);
         World {
+            robot: Arc::clone(&scene.robot),
             scene: scene.clone(),
             settings,
             physics,
-            robot,
+            handle,
             block,
             base,
             block_quaternion: state.block.quaternion_xyzw,
-            kinematics: Arm::new(),
         }
     }
 
-    /// One control step of 50 ms with the joint velocities `executed` \[rad/s\] (used in f32).
+    /// One control step of 50 ms with the joint velocities `executed` \[rad/s, m/s\] (used in f32).
     pub fn step(&mut self, executed: &Action) {
-        arm::command(&mut self.physics, self.robot, executed);
+        arm::command(&mut self.physics, &self.robot, self.handle, executed);
         let grain = self.grain();
         self.physics.integration_parameters = self.settings.parameters(grain);
         for _ in 0..grain.steps {
@@ -96,7 +102,7 @@ impl World {
 
     /// What there is to see now. Forces are those of the physics step that led here (0 in a world that was just made or set).
     pub fn observe(&mut self) -> Observation {
-        let (q_rad, dq_rad_s) = arm::read(&self.physics, self.robot);
+        let (q, dq) = arm::read(&self.physics, &self.robot, self.handle);
         let body = &self.physics.bodies[self.block];
         let mut block = to_pose(body.position());
         let agreement: f64 = block.quaternion_xyzw.iter().zip(&self.block_quaternion).map(|(a, b)| a * b).sum();
@@ -105,17 +111,18 @@ impl World {
         }
         self.block_quaternion = block.quaternion_xyzw;
         Observation {
-            state: State { q_rad, dq_rad_s, block, context: self.scene.context },
-            tool_m: tool_of(&self.kinematics.link_poses(&q_rad)).translation.vector.into(),
+            robot: Arc::clone(&self.robot),
+            state: State { q, dq, block, context: self.scene.context },
+            tool_m: self.robot.tool_pose(&q).translation.vector.into(),
             base_now: self.base.map(|handle| to_pose(self.physics.bodies[handle].position())),
-            contacts: contacts::read(&self.physics),
+            contacts: contacts::read(&self.physics, &self.robot),
             block_speed_m_s: f64::from(body.linvel().length()),
         }
     }
 
-    /// Poses of the arm's links, from its joint angles.
-    pub fn link_poses(&self) -> LinkPoses {
-        self.kinematics.link_poses(&arm::read(&self.physics, self.robot).0)
+    /// Poses of the robot's links, from its joint positions.
+    pub fn link_poses(&self) -> Vec<Isometry3<f64>> {
+        self.robot.link_poses(&arm::read(&self.physics, &self.robot, self.handle).0)
     }
 
     /// Puts the world into a recorded state: exact in joint angles, joint velocities and block pose. The block is at rest, the base
@@ -136,8 +143,11 @@ impl World {
     /// # Errors
     /// [`Error::Failed`] when the bytes are no snapshot of this version.
     pub fn restore(bytes: &[u8]) -> Result<World> {
-        postcard::from_bytes(bytes)
-            .map_err(|e| Error::Failed(format!("{} bytes are no snapshot of a world by this version of hilt: {e}", bytes.len())))
+        let mut world: World = postcard::from_bytes(bytes).map_err(|e| {
+            Error::Failed(format!("{} bytes are no snapshot of a world by this version of hilt: {e}", bytes.len()))
+        })?;
+        world.scene.robot = Arc::clone(&world.robot);
+        Ok(world)
     }
 }
 
@@ -168,14 +178,16 @@ fn insert_cube(physics: &mut PhysicsWorld, owner: Owner, at: &Pose, scene: &Scen
 mod tests {
     use super::*;
     use crate::config::SceneSettings;
+    use crate::robot::file::built_in::paper_robot;
     use crate::tasks::{Task, draw_scene};
 
     #[test]
     fn the_table_carries_the_weight_of_the_block() {
         let settings = SceneSettings::default();
-        let scene = draw_scene(Task::PickUp, &settings, &mut crate::seed::stream(0, "weight", 0)).expect("there is room");
+        let scene =
+            draw_scene(&paper_robot(), Task::PickUp, &settings, &mut crate::seed::stream(0, "weight", 0)).expect("there is room");
         let mut world = World::new(&scene);
-        (0..20).for_each(|_| world.step(&[0.0; JOINTS]));
+        (0..20).for_each(|_| world.step(&[0.0; 9].into()));
         let block = world.physics.bodies[world.block].colliders()[0];
         let force: f64 = world.physics.contact_pairs_with(block).map(|pair| contacts::force_n(pair, &world.physics)).sum();
         let weight = scene.block_mass_kg * f64::from(GRAVITY_M_S2);

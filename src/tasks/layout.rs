@@ -1,21 +1,24 @@
-//! What the rows of a task's states and actions hold.
+//! What the rows of a robot's states and actions in a task hold.
 
 use super::{REST_HEIGHT_M, Task};
 use crate::demo::{Demo, Episode, Step};
 use crate::layout::{Aim, Chain, Frame, Holds, Layout, Span};
-use crate::robot::VELOCITY_LIMITS_RAD_S;
-use crate::robot::jaco::TOOL_IN_HAND_M;
-use crate::robot::kinematics::Arm;
-use crate::state::{ARM_JOINTS, Action, BASE_DIM, CONTROL_DT_S, JOINTS, State, action_names};
+use crate::robot::Robot;
+use crate::robot::file::built_in::paper_robot;
+use crate::robot::model::Joint;
+use crate::state::{Action, CONTROL_DT_S};
+use nalgebra::Isometry3;
 use serde_json::{Value, json};
-use std::sync::{Arc, LazyLock};
+use std::ops::Range;
+use std::sync::Arc;
 
-static LAYOUTS: LazyLock<[Arc<Layout>; 3]> = LazyLock::new(|| Task::ALL.map(|task| Arc::new(of(task))));
+/// Names of the entries of a pose and of a point, after their body's.
+const POSE: [&str; 7] = ["x_m", "y_m", "z_m", "qx", "qy", "qz", "qw"];
 
 impl Task {
-    /// What its rows hold.
-    pub fn layout(self) -> Arc<Layout> {
-        Arc::clone(&LAYOUTS[self as usize])
+    /// What the rows of this robot in this task hold.
+    pub fn layout(self, robot: &Robot) -> Arc<Layout> {
+        Arc::new(layout(self, robot))
     }
 }
 
@@ -26,76 +29,100 @@ impl Episode {
     /// See [`Demo::new`].
     pub fn to_demo(&self) -> Result<Demo, String> {
         let states = self.steps.iter().chain([&self.last]).flat_map(|s| s.state.to_row()).collect();
-        let rows = |pick: fn(&Step) -> &Action| self.steps.iter().flat_map(|s| pick(s).map(|v| v as f32)).collect::<Vec<f32>>();
-        Demo::new(&self.scene.task.layout(), states, rows(|s| &s.commanded), rows(|s| &s.executed))
+        let rows =
+            |pick: fn(&Step) -> &Action| self.steps.iter().flat_map(|s| pick(s).iter().map(|v| *v as f32)).collect::<Vec<f32>>();
+        Demo::new(&self.scene.task.layout(&self.scene.robot), states, rows(|s| &s.commanded), rows(|s| &s.executed))
     }
 }
 
-/// The description of a network as this version has it: those of older ones name the task, and leave its layout unsaid.
+/// The description of a network as this version has it: those of older ones name the task, and leave its layout unsaid, which is that of the paper's robot.
 pub fn with_layout(mut description: Value) -> Value {
     let task = description.get("task").and_then(Value::as_str).and_then(|name| name.parse::<Task>().ok());
     if let (Some(task), None) = (task, description.get("layout")) {
-        description["layout"] = json!(*task.layout());
+        description["layout"] = json!(*task.layout(&paper_robot()));
     }
     description
 }
 
-fn of(task: Task) -> Layout {
-    let (names, commands) = (State::column_names(task), action_names());
-    let span = |name: &str, holds, entries: &[String]| Span { name: name.into(), holds, entries: entries.to_vec() };
+fn layout(task: Task, robot: &Robot) -> Layout {
+    // `q_rad` of joints that turn, `q_m` of those that slide.
+    let of_joints = |name: &str, holds, entry: fn(&Joint) -> String, which: Range<usize>| Span {
+        name: name.into(),
+        holds,
+        entries: robot.joints[which].iter().map(entry).collect(),
+    };
+    let of_body = |name: &str, holds, parts: &[&str]| Span {
+        name: name.into(),
+        holds,
+        entries: parts.iter().map(|part| format!("{name}.{part}")).collect(),
+    };
+    let all = 0..robot.joints.len();
     let mut state = vec![
-        span("q", Holds::JointPositions, &names[..JOINTS]),
-        span("dq", Holds::JointVelocities, &names[JOINTS..2 * JOINTS]),
-        span("block", Holds::Pose, &names[2 * JOINTS..BASE_DIM]),
+        of_joints("q", Holds::JointPositions, Joint::position_name, all.clone()),
+        of_joints("dq", Holds::JointVelocities, Joint::velocity_name, all),
+        of_body("block", Holds::Pose, &POSE),
     ];
     // A block on the base block is as far above it as two that rest on the table are high.
     let aim = match task {
         Task::PickUp => None,
-        Task::PickAndPlace => Some(("goal", Holds::FixedPoint, 0.0)),
-        Task::Stack => Some(("base", Holds::FixedPose, 2.0 * REST_HEIGHT_M)),
+        Task::PickAndPlace => Some((of_body("goal", Holds::FixedPoint, &POSE[..3]), 0.0)),
+        Task::Stack => Some((of_body("base", Holds::FixedPose, &POSE), 2.0 * REST_HEIGHT_M)),
     };
-    state.extend(aim.map(|(name, holds, _)| span(name, holds, &names[BASE_DIM..])));
-    let aims = aim.map(|(name, _, up_m)| Aim { object: "block".into(), target: name.into(), offset_m: [0.0, 0.0, up_m] });
-    let action = vec![
-        span("arm", Holds::ArmVelocities, &commands[..ARM_JOINTS]),
-        span("fingers", Holds::FingerVelocities, &commands[ARM_JOINTS..]),
-    ];
+    let to =
+        |(target, up_m): &(Span, f64)| Aim { object: "block".into(), target: target.name.clone(), offset_m: [0.0, 0.0, *up_m] };
+    let aims = aim.iter().map(to).collect();
+    state.extend(aim.map(|(span, _)| span));
+    let closing = |i: usize| robot.closing_way(i).signum();
+    let sign = |i: usize| if i < robot.arm { 1.0 } else { closing(i - robot.arm) };
+    let units: Vec<f64> = robot.joints.iter().enumerate().map(|(i, joint)| joint.per_radian() * sign(i)).collect();
     Layout {
         name: task.name().into(),
         period_s: CONTROL_DT_S,
         state,
-        action,
-        action_limits: VELOCITY_LIMITS_RAD_S.to_vec(),
-        aims: aims.into_iter().collect(),
-        arm: Some(arm()),
+        action: vec![
+            of_joints("arm", Holds::ArmVelocities, Joint::command_name, 0..robot.arm),
+            of_joints("fingers", Holds::FingerVelocities, Joint::command_name, robot.fingers()),
+        ],
+        action_limits: robot.joints.iter().map(|joint| joint.velocity).collect(),
+        action_units: if units.iter().all(|unit| *unit == 1.0) { Vec::new() } else { units },
+        aims,
+        arm: Some(arm(robot)),
     }
 }
 
 /// The arm's fixed transforms.
-fn arm() -> Chain {
-    let arm = Arm::new();
-    let frame = |i: usize| {
-        let (origin, matrix) = (arm.origin(i), arm.origin(i).rotation.to_rotation_matrix());
+fn arm(robot: &Robot) -> Chain {
+    let frame = |at: &Isometry3<f64>| {
+        let matrix = at.rotation.to_rotation_matrix();
         Frame {
             columns: std::array::from_fn(|c| std::array::from_fn(|r| matrix[(r, c)])),
-            origin_m: origin.translation.vector.into(),
+            origin_m: at.translation.vector.into(),
         }
     };
-    Chain { joints: (0..ARM_JOINTS).map(frame).collect(), tool_m: TOOL_IN_HAND_M }
+    Chain { joints: robot.joints[..robot.arm].iter().map(|joint| frame(&joint.origin)).collect(), tool_m: robot.tool_m }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::robot::file::built_in::named;
 
     #[test]
-    fn a_layout_describes_its_tasks_rows() {
-        for task in Task::ALL {
-            let layout = task.layout();
-            assert_eq!(layout.check(), Ok(()));
-            assert_eq!((layout.state_dim(), layout.changing(), layout.action_dim()), (task.state_dim(), BASE_DIM, JOINTS));
-            let names: Vec<_> = layout.state.iter().flat_map(|span| &span.entries).cloned().collect();
-            assert_eq!(names, State::column_names(task));
+    fn a_layout_describes_the_rows_of_its_robot() {
+        let panda = named("panda").expect("it is there").expect("it is sound");
+        for (robot, joints) in [(&*paper_robot(), 9), (&panda, 9)] {
+            for (task, more) in [(Task::PickUp, 0), (Task::PickAndPlace, 3), (Task::Stack, 7)] {
+                let layout = task.layout(robot);
+                assert_eq!(layout.check(), Ok(()));
+                let dims = (layout.state_dim(), layout.changing(), layout.action_dim());
+                assert_eq!(dims, (2 * joints + 7 + more, 2 * joints + 7, joints));
+            }
         }
+        let layout = Task::Stack.layout(&panda);
+        let names = |at: usize| layout.state.iter().flat_map(|span| &span.entries).nth(at).cloned();
+        assert_eq!(names(0).as_deref(), Some("panda_joint1.q_rad"));
+        assert_eq!(names(8).as_deref(), Some("panda_finger_joint2.q_m"));
+        assert_eq!(names(17).as_deref(), Some("panda_finger_joint2.dq_m_s"));
+        assert_eq!(layout.action[1].entries[1], "panda_finger_joint2.velocity_m_s");
     }
 }

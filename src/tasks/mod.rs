@@ -14,7 +14,7 @@ pub use layout::with_layout;
 pub use monitor::{Monitor, Verdict};
 pub use observation::Observation;
 pub use reward::dense;
-pub use spawn::{REACH_M, REST_HEIGHT_M, draw_scene};
+pub use spawn::{REST_HEIGHT_M, draw_scene};
 
 use crate::scene::{BLOCK_EDGE_M, Scene};
 use crate::state::Context;

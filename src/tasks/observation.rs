@@ -1,8 +1,10 @@
 //! What there is to see of a moment.
 
 use crate::demo::Contacts;
+use crate::robot::Robot;
 use crate::state::{Pose, State};
 use nalgebra::Vector3;
+use std::sync::Arc;
 
 /// A finger presses when its normal force on the block exceeds this \[N\]; the block weighs about 1 N.
 const PRESS_N: f64 = 0.05;
@@ -12,6 +14,8 @@ pub(super) const REST_SPEED_M_S: f64 = 0.01;
 /// What the simulator shows of one moment.
 #[derive(Clone, Debug)]
 pub struct Observation {
+    /// Who acts.
+    pub robot: Arc<Robot>,
     /// s_t.
     pub state: State,
     /// Tool point in the world \[m\].
@@ -35,9 +39,8 @@ impl Observation {
         self.contacts.finger_block_n.iter().all(|f| *f <= 0.0)
     }
 
-    /// Whether the thumb (finger 1) and one of its opposites press the block.
+    /// Whether two fingers that oppose each other press the block.
     pub fn gripped(&self) -> bool {
-        let [thumb, left, right] = self.contacts.finger_block_n.map(|f| f > PRESS_N);
-        thumb && (left || right)
+        self.robot.grips(|finger| self.contacts.finger_block_n[finger] > PRESS_N)
     }
 }

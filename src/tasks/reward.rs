@@ -15,8 +15,8 @@
 use super::observation::Observation;
 use super::{Task, Verdict, pick_up};
 use crate::math::tanh;
+use crate::robot::Robot;
 use crate::scene::Scene;
-use crate::state::ARM_JOINTS;
 
 /// What the best step short of success earns before it is scaled to 1.
 const MOST: f64 = 8.0;
@@ -26,8 +26,6 @@ const NEAR_M: f64 = 0.2;
 const AROUND_M: f64 = 0.03;
 /// Speeds are told apart within this \[m/s\].
 const STILL_M_S: f64 = 0.1;
-/// Angle of a finger that is closed around nothing \[rad\]: its upper limit.
-const CLOSED_RAD: f64 = 1.51;
 /// Positions of the conditions `lifted` and, after it, of what the task wants in `task.condition_names()`.
 const LIFTED: usize = 2;
 
@@ -59,10 +57,19 @@ fn near(distance_m: f64, scale_m: f64) -> f64 {
     1.0 - tanh(distance_m / scale_m)
 }
 
-/// How far the fingers are closed, 0 to 1.
+/// How far the fingers are closed, 0 to 1: from as far open as they go to closed around nothing.
 fn closed(seen: &Observation) -> f64 {
-    let fingers = &seen.state.q_rad[ARM_JOINTS..];
-    (fingers.iter().sum::<f64>() / (fingers.len() as f64 * CLOSED_RAD)).clamp(0.0, 1.0)
+    let robot = &*seen.robot;
+    let way = |i: usize, to: f64| (to - widest(robot, i)) * robot.closing_way(i).signum();
+    let gone: f64 = robot.fingers().enumerate().map(|(i, joint)| way(i, seen.state.q[joint])).sum();
+    let whole: f64 = robot.closed.iter().enumerate().map(|(i, closed)| way(i, *closed)).sum();
+    (gone / whole).clamp(0.0, 1.0)
+}
+
+/// Where finger `i` is as far open as it goes \[rad, m\].
+fn widest(robot: &Robot, i: usize) -> f64 {
+    let [low, high] = robot.joints[robot.arm + i].limits;
+    if robot.closing_way(i) > 0.0 { low } else { high }
 }
 
 /// How far the fingers are open; 1 once they have let go.
@@ -80,8 +87,9 @@ mod tests {
     use super::*;
     use crate::config::SceneSettings;
     use crate::demo::Contacts;
+    use crate::robot::file::built_in::paper_robot;
     use crate::seed::stream;
-    use crate::state::{JOINTS, State};
+    use crate::state::State;
     use crate::tasks::{Monitor, draw_scene};
 
     const GAMMA: f64 = 0.9;
@@ -93,14 +101,15 @@ mod tests {
         let block = crate::state::Pose { position_m: block_m, ..scene.block };
         let touches = |height: f64| block_m[2] < height + 1e-6;
         Observation {
-            state: State { q_rad: [0.7; JOINTS], dq_rad_s: [0.0; JOINTS], block, context: scene.context },
+            robot: paper_robot(),
+            state: State { q: [0.7; 9].into(), dq: [0.0; 9].into(), block, context: scene.context },
             tool_m: [block_m[0], block_m[1], block_m[2] + away_m],
             base_now,
             contacts: Contacts {
-                finger_block_n: [force; 3],
+                finger_block_n: [force; 3].into(),
                 block_table: touches(0.025),
                 block_base: !touches(0.025) && touches(0.075),
-                ..Contacts::default()
+                ..Contacts::none(3)
             },
             block_speed_m_s: 0.0,
         }
@@ -108,7 +117,8 @@ mod tests {
 
     /// What the stages of a task earn, one after another: far, near, gripped, on the way, where it belongs, released there until solved.
     fn earned(task: Task) -> Vec<f64> {
-        let scene = draw_scene(task, &SceneSettings::default(), &mut stream(3, "reward test", 0)).expect("a scene");
+        let scene =
+            draw_scene(&paper_robot(), task, &SceneSettings::default(), &mut stream(3, "reward test", 0)).expect("a scene");
         let mut monitor = Monitor::new(&scene);
         let start = scene.block.position_m;
         let target = scene.target_m();

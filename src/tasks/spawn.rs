@@ -5,25 +5,25 @@ use super::pick_and_place::MIN_TRAVEL_M;
 use crate::config::{SceneSettings, Spread};
 use crate::error::{Error, Result};
 use crate::math::hypot;
+use crate::robot::Robot;
 use crate::scene::{BLOCK_EDGE_M, Obstacle, Scene};
 use crate::state::{Context, Pose};
 use rand::{Rng, RngExt};
+use std::sync::Arc;
 
 /// Height of a block's centre that stands on the table \[m\].
 pub const REST_HEIGHT_M: f64 = BLOCK_EDGE_M / 2.0;
 /// Room between a spawned block and a box or the base block \[m\]: the opened hand must fit.
 const CLEARANCE_M: f64 = 0.02;
-/// Distances from the arm's foot that the level hand reaches \[m\]: nothing is drawn nearer or farther. Of 1500 plans over 40 x 40 cm
-/// 12 failed, all nearer than 0.291 m.
-pub const REACH_M: [f64; 2] = [0.295, 0.68];
 /// Draws before a spawn area counts as blocked.
 const MAX_DRAWS: usize = 1000;
 
-/// Draws the scene of one episode.
+/// Draws the scene of one episode of a robot.
 ///
 /// # Errors
 /// [`Error::Usage`] when spawn and goal areas leave no room (reach, obstacles, base block or the distance to the goal).
-pub fn draw_scene(task: Task, settings: &SceneSettings, rng: &mut impl Rng) -> Result<Scene> {
+pub fn draw_scene(robot: &Arc<Robot>, task: Task, settings: &SceneSettings, rng: &mut impl Rng) -> Result<Scene> {
+    let free = |point| is_free(robot, point, &settings.obstacles);
     for _ in 0..MAX_DRAWS {
         let block = Pose::from_yaw(draw_point(settings.spawn_x_m, settings.spawn_y_m, rng), draw_yaw(settings, rng));
         let context = match task {
@@ -37,11 +37,12 @@ pub fn draw_scene(task: Task, settings: &SceneSettings, rng: &mut impl Rng) -> R
         let apart = |a: [f64; 3], b: [f64; 3], least: f64| hypot(a[0] - b[0], a[1] - b[1]) >= least;
         let fits = match context {
             Context::None => true,
-            Context::Goal(goal) => apart(goal, block.position_m, MIN_TRAVEL_M) && free(goal, &settings.obstacles),
+            Context::Goal(goal) => apart(goal, block.position_m, MIN_TRAVEL_M) && free(goal),
             Context::Base(base) => apart(base.position_m, block.position_m, 2.0 * BLOCK_EDGE_M),
         };
-        if fits && free(block.position_m, &settings.obstacles) {
+        if fits && free(block.position_m) {
             return Ok(Scene {
+                robot: Arc::clone(robot),
                 task,
                 block,
                 context,
@@ -51,11 +52,11 @@ pub fn draw_scene(task: Task, settings: &SceneSettings, rng: &mut impl Rng) -> R
             });
         }
     }
-    Err(no_room(task, settings))
+    Err(no_room(robot, task, settings))
 }
 
 /// Names the areas that the task draws from, and what they must leave.
-fn no_room(task: Task, settings: &SceneSettings) -> Error {
+fn no_room(robot: &Robot, task: Task, settings: &SceneSettings) -> Error {
     let area = |x: [f64; 2], y: [f64; 2]| format!("x {x:?} m, y {y:?} m");
     let spawn = area(settings.spawn_x_m, settings.spawn_y_m);
     let spawn_keys = "scene.spawn_x_m, scene.spawn_y_m";
@@ -73,10 +74,11 @@ fn no_room(task: Task, settings: &SceneSettings) -> Error {
         ),
     };
     let found = format!("no room for {task} after {MAX_DRAWS} draws: {what}");
-    let [near, far] = REACH_M;
-    Error::Usage(format!(
-        "{found}; keep within reach, {near} to {far} m around the arm's foot, and clear of obstacles{advice} (keys {keys})"
-    ))
+    let within = match robot.reach_m {
+        Some([near, far]) => format!("within reach, {near} to {far} m around the foot of {}, and ", robot.name),
+        None => String::new(),
+    };
+    Error::Usage(format!("{found}; keep {within}clear of obstacles{advice} (keys {keys})"))
 }
 
 fn words([x, y]: [Spread; 2]) -> String {
@@ -98,19 +100,21 @@ fn draw_yaw(settings: &SceneSettings, rng: &mut impl Rng) -> f64 {
 }
 
 /// Within reach, and clear of all boxes.
-fn free(point: [f64; 3], obstacles: &[Obstacle]) -> bool {
+fn is_free(robot: &Robot, point: [f64; 3], obstacles: &[Obstacle]) -> bool {
     let margin = BLOCK_EDGE_M / 2.0 + CLEARANCE_M;
-    let within_reach = (REACH_M[0]..=REACH_M[1]).contains(&hypot(point[0], point[1]));
+    let away = hypot(point[0], point[1]);
+    let within_reach = robot.reach_m.is_none_or(|[near, far]| (near..=far).contains(&away));
     within_reach && obstacles.iter().all(|o| (0..2).any(|i| (point[i] - o.center_m[i]).abs() > o.size_m[i] / 2.0 + margin))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::robot::file::built_in::paper_robot;
     use crate::seed::stream;
 
     fn draw(task: Task, settings: &SceneSettings, index: u64) -> Scene {
-        draw_scene(task, settings, &mut stream(5, "spawn test", index)).expect("there is room")
+        draw_scene(&paper_robot(), task, settings, &mut stream(5, "spawn test", index)).expect("there is room")
     }
 
     #[test]
@@ -140,14 +144,14 @@ mod tests {
         let wide = SceneSettings { spawn_x_m: [0.1, 0.9], spawn_y_m: [-0.4, 0.4], ..SceneSettings::default() };
         for index in 0..200 {
             let [x, y, _] = draw(Task::PickUp, &wide, index).block.position_m;
-            assert!((REACH_M[0]..=REACH_M[1]).contains(&hypot(x, y)), "a block at {x} {y}");
+            assert!((0.295..=0.68).contains(&hypot(x, y)), "a block at {x} {y}");
         }
     }
 
     #[test]
     fn an_area_without_room_is_named_with_its_keys() {
         let refusal = |task, settings: SceneSettings| {
-            let drawn = draw_scene(task, &settings, &mut stream(5, "spawn test", 0));
+            let drawn = draw_scene(&paper_robot(), task, &settings, &mut stream(5, "spawn test", 0));
             drawn.expect_err("there is no room").to_string()
         };
         let far = SceneSettings { goal_x_m: [1.2, 1.4], ..SceneSettings::default() };

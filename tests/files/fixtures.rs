@@ -2,9 +2,11 @@
 
 use hilt::data::Provenance;
 use hilt::demo::{Contacts, Episode, Phase, Step};
+use hilt::joints::Joints;
+use hilt::robot::file::built_in::paper_robot;
 use hilt::scene::{Obstacle, Scene};
 use hilt::seed::stream;
-use hilt::state::{Context, JOINTS, Pose, State};
+use hilt::state::{Context, Pose, State};
 use hilt::table::{Table, Values};
 use hilt::tasks::{FailureClass, Task};
 use hilt::tensor::NamedTensor;
@@ -44,6 +46,7 @@ pub fn episode(task: Task, index: u64, steps: usize) -> Episode {
         Task::Stack => Context::Base(base),
     };
     let scene = Scene {
+        robot: paper_robot(),
         task,
         block: pose(&mut rng),
         context,
@@ -53,8 +56,8 @@ pub fn episode(task: Task, index: u64, steps: usize) -> Episode {
     };
     let steps: Vec<Step> = (0..steps).map(|t| step(task, context, t, &mut rng)).collect();
     let mut last = step(task, context, 0, &mut rng);
-    last.commanded = [0.0; JOINTS];
-    last.executed = [0.0; JOINTS];
+    last.commanded = Joints::zeros(9);
+    last.executed = Joints::zeros(9);
     last.phase = None;
     let success = index % 3 != 2;
     Episode { index, scene, steps, last, success, failure: (!success).then_some(FailureClass::Dropped) }
@@ -63,13 +66,13 @@ pub fn episode(task: Task, index: u64, steps: usize) -> Episode {
 fn step(task: Task, context: Context, t: usize, rng: &mut ChaCha8Rng) -> Step {
     let mut commanded = numbers(rng);
     commanded[3] = -0.0;
-    let finger_block_n = [rng.random(), 0.0, f64::MIN_POSITIVE];
+    let finger_block_n = [rng.random(), 0.0, f64::MIN_POSITIVE].into();
     Step {
-        state: State { q_rad: numbers(rng), dq_rad_s: numbers(rng), block: pose(rng), context },
+        state: State { q: numbers(rng), dq: numbers(rng), block: pose(rng), context },
         base_now: (task == Task::Stack).then(|| pose(rng)),
         commanded,
         executed: numbers(rng),
-        contacts: Contacts { finger_block_n, block_table: rng.random(), robot_table: rng.random(), ..Contacts::default() },
+        contacts: Contacts { finger_block_n, block_table: rng.random(), robot_table: rng.random(), ..Contacts::none(3) },
         block_speed_m_s: rng.random(),
         reward: if t == 3 { 0.1 } else { 0.0 },
         conditions: task.condition_names().iter().map(|_| rng.random()).collect(),
@@ -77,8 +80,8 @@ fn step(task: Task, context: Context, t: usize, rng: &mut ChaCha8Rng) -> Step {
     }
 }
 
-fn numbers(rng: &mut ChaCha8Rng) -> [f64; JOINTS] {
-    std::array::from_fn(|_| rng.random_range(-3.0..3.0))
+fn numbers(rng: &mut ChaCha8Rng) -> Joints {
+    Joints::from_fn(9, |_| rng.random_range(-3.0..3.0))
 }
 
 fn pose(rng: &mut ChaCha8Rng) -> Pose {

@@ -1,6 +1,5 @@
 //! Files behind a valid seal that nobody of good will has written, and directories that nobody has made in one go.
 
-use crate::URDF;
 use crate::fixtures::{episode, provenance, table, tensors};
 use hilt::data::{Provenance, inspect, inspect_text, json_file, recording, seal, table_file, weights};
 use hilt::error::Result;
@@ -89,7 +88,7 @@ fn inspect_knows_an_artefact_by_its_content_and_not_by_its_ending() {
     let (task, origin) = (Task::PickUp, provenance("simulate", Task::PickUp));
     let at = |name: &str| dir.path().join(name);
     fs::write(at("model.pt"), encoded_weights()).expect("written");
-    recording::write(&at("episode"), &episode(task, 0, 3), URDF, &origin).expect("written");
+    recording::write(&at("episode"), &episode(task, 0, 3), &origin).expect("written");
     table_file::write(&at("log.csv"), &table(3), &origin).expect("written");
     json_file::write(&at("result.safetensors"), &json!({}), &origin).expect("written");
     let kinds = [("model.pt", "weights"), ("episode", "recording"), ("log.csv", "table"), ("result.safetensors", "summary")];
@@ -107,7 +106,7 @@ fn inspect_says_that_recordings_are_of_several_origins() {
     let task = Task::PickUp;
     let origin = provenance("simulate", task);
     let write = |index: u64, origin: &Provenance| {
-        recording::write(&dir.path().join(recording::file_name(index)), &episode(task, index, 4), URDF, origin).expect("written");
+        recording::write(&dir.path().join(recording::file_name(index)), &episode(task, index, 4), origin).expect("written");
     };
     let found = || inspect(dir.path(), &Interrupt::default()).expect("recordings");
     (0..3).for_each(|index| write(index, &origin));

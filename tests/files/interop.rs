@@ -4,6 +4,7 @@ use crate::fixtures::{episode, provenance, table, tensors};
 use hilt::data::dataset::{self, DatasetEpisode};
 use hilt::data::{json_file, recording, table_file, weights};
 use hilt::interrupt::Interrupt;
+use hilt::robot::file::built_in::paper_robot;
 use hilt::tasks::Task;
 use serde_json::json;
 use std::path::PathBuf;
@@ -19,7 +20,7 @@ fn write_a_run() {
         let episodes: Vec<_> = (0..12).map(|i| episode(task, i, 20 + i as usize)).collect();
         for e in &episodes {
             let path = dir.join("recordings").join(recording::file_name(e.index));
-            recording::write(&path, e, "<robot name=\"j2n6s300\"/>", &origin("simulate")).expect("written");
+            recording::write(&path, e, &origin("simulate")).expect("written");
         }
         let demos: Vec<_> = episodes.iter().map(|e| e.to_demo().expect("a demo")).collect();
         let (train, validation) = dataset::split(episodes.len(), 10, 0);
@@ -27,7 +28,7 @@ fn write_a_run() {
         let (train, validation) = (pick(&train), pick(&validation));
         dataset::write_split(
             &dir.join("dataset"),
-            task,
+            (&paper_robot(), task),
             &train.as_slice().into(),
             &validation.as_slice().into(),
             &origin("convert"),

@@ -11,14 +11,13 @@ use fixtures::{contents, episode, provenance, table, tensors};
 use hilt::data::{ContentHash, inspect, inspect_text, json_file, recording, table_file, weights};
 use hilt::error::{Error, Result};
 use hilt::interrupt::Interrupt;
+use hilt::robot::file::built_in::paper_robot;
 use hilt::table::{Table, Values};
 use hilt::tasks::Task;
 use serde_json::json;
 use std::fs;
 use std::path::Path;
 use tempfile::tempdir;
-
-const URDF: &str = "<robot name=\"j2n6s300\"/>";
 
 /// Places at which a file is cut and changed, beside its last bytes.
 const PLACES: usize = 80;
@@ -56,8 +55,8 @@ fn recordings_round_trip_exactly_and_are_the_same_bytes_anywhere() {
     for (task, index) in Task::ALL.into_iter().zip(4..) {
         let (made, origin) = (episode(task, index, 30), provenance("simulate", task));
         let name = recording::file_name(index);
-        recording::write(&here.path().join(&name), &made, URDF, &origin).expect("written");
-        recording::write(&there.path().join(&name), &made, URDF, &origin).expect("written");
+        recording::write(&here.path().join(&name), &made, &origin).expect("written");
+        recording::write(&there.path().join(&name), &made, &origin).expect("written");
         let (found, found_origin) = recording::read(&here.path().join(&name)).expect("readable");
         assert_eq!(found, made);
         assert_eq!(found.to_demo(), made.to_demo());
@@ -71,7 +70,7 @@ fn recordings_round_trip_exactly_and_are_the_same_bytes_anywhere() {
 fn damaged_recordings_are_refused() {
     let dir = tempdir().expect("dir");
     let path = dir.path().join("episode-00001.mcap");
-    recording::write(&path, &episode(Task::Stack, 1, 12), URDF, &provenance("simulate", Task::Stack)).expect("written");
+    recording::write(&path, &episode(Task::Stack, 1, 12), &provenance("simulate", Task::Stack)).expect("written");
     refuses_damage(&path, || recording::read(&path));
 }
 
@@ -206,7 +205,7 @@ fn another_schema_version_is_named_whoever_wrote_it() {
     newer.schema_version = 2;
     let at = |name: &str| dir.path().join(name);
     let write_all = |origin: &hilt::data::Provenance| {
-        recording::write(&at("a.mcap"), &episode(task, 0, 3), URDF, origin).expect("written");
+        recording::write(&at("a.mcap"), &episode(task, 0, 3), origin).expect("written");
         table_file::write(&at("a.parquet"), &table(3), origin).expect("written");
         weights::write(&at("a.safetensors"), "policy", &tensors(), &json!({}), origin).expect("written");
         json_file::write(&at("a.json"), &json!({}), origin).expect("written");
@@ -247,7 +246,7 @@ fn inspect_knows_every_kind() {
     let at = |name: &str| dir.path().join(name);
     for index in 0..3 {
         let path = at("recordings").join(recording::file_name(index));
-        recording::write(&path, &episode(task, index, 9), URDF, &origin).expect("written");
+        recording::write(&path, &episode(task, index, 9), &origin).expect("written");
     }
     table_file::write(&at("t.parquet"), &table(50), &origin).expect("written");
     weights::write(&at("w.safetensors"), "dynamics", &tensors(), &json!({ "hidden": 32 }), &origin).expect("written");
@@ -263,7 +262,7 @@ fn inspect_knows_every_kind() {
     assert_eq!(all["failures"], json!({ "dropped": 1 }));
     let one = kind("recordings/episode-00001.mcap");
     assert_eq!((&one["steps"], &one["duration_s"]), (&json!(9), &json!(0.45)));
-    assert_eq!(one["states"].as_array().map(Vec::len), Some(task.state_dim()));
+    assert_eq!(one["states"].as_array().map(Vec::len), Some(task.layout(&paper_robot()).state_dim()));
     let columns = kind("t.parquet");
     assert_eq!(columns["columns"][1]["not_finite"], 1);
     assert_eq!(columns["columns"][1]["unit"], "m/s");

@@ -2,10 +2,9 @@
 
 use crate::fixtures::{episode, provenance};
 use foxglove::messages::{FrameTransforms, JointStates, SceneUpdate};
-use hilt::data::recording::{self, BASE_FRAME, BLOCK_FRAME, URDF_NAME, WORLD_FRAME};
-use hilt::robot::Arm;
-use hilt::robot::jaco::LINK_NAMES;
-use hilt::state::{CONTROL_HZ, JOINT_NAMES};
+use hilt::data::recording::{self, BASE_FRAME, BLOCK_FRAME, ROBOT_NAME, URDF_NAME, WORLD_FRAME};
+use hilt::robot::{Robot, urdf};
+use hilt::state::CONTROL_HZ;
 use hilt::tasks::Task;
 use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion};
 use prost::Message;
@@ -29,7 +28,7 @@ fn transforms_add_up_to_the_kinematics_at_simulated_times() {
     let dir = tempdir().expect("dir");
     let path = dir.path().join("episode.mcap");
     let made = episode(Task::Stack, 1, 8);
-    recording::write(&path, &made, "<robot/>", &provenance("simulate", Task::Stack)).expect("written");
+    recording::write(&path, &made, &provenance("simulate", Task::Stack)).expect("written");
     let bytes = fs::read(&path).expect("bytes");
     let moments: Vec<_> = made.steps.iter().chain([&made.last]).collect();
     let mut seen: BTreeMap<String, usize> = BTreeMap::new();
@@ -40,8 +39,9 @@ fn transforms_add_up_to_the_kinematics_at_simulated_times() {
             "/tf" => {
                 let transforms = FrameTransforms::decode(&message.data[..]).expect("transforms");
                 assert_eq!(message.log_time, *t as u64 * 1_000_000_000 / u64::from(CONTROL_HZ));
-                let expected = Arm::new().link_poses(&moments[*t].state.q_rad);
-                for (name, pose) in LINK_NAMES.iter().zip(expected) {
+                let expected = made.scene.robot.link_poses(&moments[*t].state.q);
+                for (link, pose) in made.scene.robot.links.iter().zip(expected) {
+                    let name = &link.name;
                     let error = world_from(name, &transforms).inverse() * pose;
                     assert!(error.translation.vector.norm() < 1e-9 && error.rotation.angle() < 1e-7, "{name} at {t}");
                 }
@@ -51,8 +51,8 @@ fn transforms_add_up_to_the_kinematics_at_simulated_times() {
             }
             "/joint_states" => {
                 let joints = JointStates::decode(&message.data[..]).expect("joints").joints;
-                assert!(joints.iter().map(|j| j.name.as_str()).eq(JOINT_NAMES));
-                assert!(joints.iter().zip(moments[*t].state.q_rad).all(|(j, q)| j.position == Some(q)));
+                assert!(joints.iter().map(|j| j.name.as_str()).eq(made.scene.robot.joints.iter().map(|j| j.name.as_str())));
+                assert!(joints.iter().zip(&moments[*t].state.q).all(|(j, q)| j.position == Some(*q)));
             }
             "/scene" => {
                 let entities = SceneUpdate::decode(&message.data[..]).expect("scene").entities;
@@ -66,6 +66,9 @@ fn transforms_add_up_to_the_kinematics_at_simulated_times() {
     let counts: Vec<usize> = ["/tf", "/joint_states", "/scene", "/hilt/step"].map(|topic| seen[topic]).into();
     assert_eq!(counts, [9, 9, 1, 9]);
     let summary = mcap::Summary::read(&bytes).expect("summary").expect("a finished file");
-    let attached = mcap::read::attachment(&bytes, &summary.attachment_indexes[0]).expect("attachment");
-    assert_eq!((attached.name.as_str(), &attached.data[..]), (URDF_NAME, &b"<robot/>"[..]));
+    let attached = |i: usize| mcap::read::attachment(&bytes, &summary.attachment_indexes[i]).expect("attachment");
+    let (first, second) = (attached(0), attached(1));
+    assert_eq!((first.name.as_str(), &first.data[..]), (URDF_NAME, urdf(&made.scene.robot).as_bytes()));
+    let robot: Robot = serde_json::from_slice(&second.data).expect("a robot");
+    assert_eq!((second.name.as_str(), &robot), (ROBOT_NAME, &*made.scene.robot));
 }

@@ -37,6 +37,7 @@ fn what_make_cannot_take_is_refused_by_name_and_nothing_is_done() {
     cases.extend(["", "dagger", "hil bc"].map(|value| ("METHOD", value)));
     cases.extend(["", "-1", "abc", "1 2", "1.5", "$(shell touch oops)"].map(|value| ("SEED", value)));
     cases.extend(["", "two"].map(|value| ("THREADS", value)));
+    cases.extend(["a b.toml", "-x.toml", "x/$(shell touch oops).toml"].map(|value| ("ROBOT", value)));
     cases.extend([("PRESET", "better"), ("PIPELINE", ""), ("RESUME", "yes"), ("CHECKPOINT", "often")]);
     for (name, value) in cases {
         for goal in ["all", "clean-runs"] {

@@ -6,12 +6,18 @@ use hilt::config::{PulseSettings, SimulateSettings};
 use hilt::demo::Episode;
 use hilt::error::Error;
 use hilt::interrupt::Interrupt;
-use hilt::robot::VELOCITY_LIMITS_RAD_S;
+use hilt::joints::Joints;
+use hilt::robot::file::built_in::paper_robot;
 use hilt::scene::{Obstacle, Scene};
 use hilt::sim::{Controller, Disturbance, run_episode};
+use hilt::state::Action;
 use hilt::state::Pose;
-use hilt::state::{ARM_JOINTS, Action, JOINTS};
 use hilt::tasks::{FailureClass, Observation, Task};
+
+/// No command of the Jaco.
+fn still() -> Action {
+    Joints::zeros(9)
+}
 
 /// Always asks for the same.
 struct Constant(Action);
@@ -23,7 +29,7 @@ impl Controller for Constant {
 }
 
 fn disturbance(settings: &SimulateSettings, index: u64) -> Disturbance {
-    Disturbance::new(settings, hilt::seed::stream(5, "simulate", index))
+    Disturbance::new(&paper_robot(), settings, hilt::seed::stream(5, "simulate", index))
 }
 
 fn run(scene: &Scene, controller: &mut dyn Controller, index: u64, max_steps: u32) -> Episode {
@@ -57,20 +63,19 @@ fn a_successful_episode_is_recorded_whole() {
     let total: f64 = episode.steps.iter().chain([&episode.last]).map(|s| s.reward).sum();
     assert!((total - 1.11).abs() < 1e-12, "milestones of pick-up add up to {total}");
     assert!(episode.last.conditions.iter().all(|c| *c));
-    assert_eq!(episode.last.executed, [0.0; JOINTS]);
+    assert_eq!(episode.last.executed, still());
     assert_eq!(episode.to_demo().expect("finite numbers").len(), episode.steps.len());
 }
 
 #[test]
 fn noise_is_on_the_executed_action_only() {
-    let command: Action =
-        std::array::from_fn(|i| if i < ARM_JOINTS { 0.01 * i as f64 } else { 0.0 }).map(|v: f64| f64::from(v as f32));
+    let command = Joints::from_fn(9, |i| if i < 6 { f64::from(0.01 * i as f32) } else { 0.0 });
     let episode = run(&scene(Task::PickUp, 0), &mut Constant(command), 0, 400);
-    let mut sum = [0.0; JOINTS];
-    let mut squares = [0.0; JOINTS];
+    let mut sum = still();
+    let mut squares = still();
     for step in &episode.steps {
         assert_eq!(step.commanded, command);
-        for i in 0..JOINTS {
+        for i in 0..9 {
             let noise = step.executed[i] - command[i];
             sum[i] += noise;
             squares[i] += noise * noise;
@@ -79,7 +84,7 @@ fn noise_is_on_the_executed_action_only() {
     }
     let n = episode.steps.len() as f64;
     assert_eq!(n, 400.0);
-    for i in 0..JOINTS {
+    for i in 0..9 {
         // Three standard errors of a mean and of a variance over 400 draws.
         assert!((sum[i] / n).abs() < 3.5 * (0.001f64 / n).sqrt(), "joint {i}: mean {}", sum[i] / n);
         assert!((squares[i] / n - 0.001).abs() < 3.5 * 0.001 * (2.0 / n).sqrt(), "joint {i}: variance {}", squares[i] / n);
@@ -90,8 +95,10 @@ fn noise_is_on_the_executed_action_only() {
 fn executed_actions_stay_within_the_velocity_limits() {
     let mut noise = disturbance(&SimulateSettings::default(), 1);
     for _ in 0..100 {
-        for (v, limit) in noise.apply(&VELOCITY_LIMITS_RAD_S.map(|l| 1.5 * l)).iter().zip(VELOCITY_LIMITS_RAD_S) {
-            assert!(*v <= limit && *v > 0.9 * limit, "{v} rad/s against a limit of {limit}");
+        let robot = paper_robot();
+        let limits: Joints = robot.joints.iter().map(|joint| joint.velocity).collect();
+        for (v, limit) in noise.apply(&limits.map(|l| 1.5 * l)).iter().zip(&limits) {
+            assert!(v <= limit && *v > 0.9 * limit, "{v} rad/s against a limit of {limit}");
         }
     }
 }
@@ -101,25 +108,25 @@ fn pulses_come_at_their_rate_last_their_time_and_move_the_arm_only() {
     let pulses = PulseSettings { probability: 0.05, steps: 4, sigma_rad_s: 0.1 };
     let mut noise = disturbance(&SimulateSettings { noise_variance: 0.0, pulses, ..SimulateSettings::default() }, 0);
     let count = 20_000;
-    let actions: Vec<Action> = (0..count).map(|_| noise.apply(&[0.0; JOINTS])).collect();
+    let actions: Vec<Action> = (0..count).map(|_| noise.apply(&still())).collect();
     let pushed = actions.iter().filter(|a| a[0] != 0.0).count() as f64 / f64::from(count);
     // A pulse of 4 steps after 0.95 / 0.05 quiet steps on average.
     let expected = 4.0 / (4.0 + 0.95 / 0.05);
     assert!((pushed - expected).abs() < 0.02, "{pushed} of the steps are pushed, expected {expected}");
-    assert!(actions.iter().all(|a| a[ARM_JOINTS..].iter().all(|v| *v == 0.0)), "a pulse moved a finger");
+    assert!(actions.iter().all(|a| a[6..].iter().all(|v| *v == 0.0)), "a pulse moved a finger");
     let changes = actions.windows(2).filter(|w| w[0] != w[1] && w[1][0] != 0.0).count() as f64;
     assert!((changes * 4.0 / f64::from(count) - pushed).abs() < 0.01, "pulses last four steps");
-    let quiet = disturbance(&SimulateSettings { noise_variance: 0.0, ..SimulateSettings::default() }, 0).apply(&[0.0; JOINTS]);
-    assert_eq!(quiet, [0.0; JOINTS]);
+    let quiet = disturbance(&SimulateSettings { noise_variance: 0.0, ..SimulateSettings::default() }, 0).apply(&still());
+    assert_eq!(quiet, still());
 }
 
 #[test]
 fn an_idle_arm_never_reaches_and_a_fallen_block_ends_the_episode() {
     let mut scene = scene(Task::PickUp, 0);
-    let idle = run(&scene, &mut Constant([0.0; JOINTS]), 0, 50);
+    let idle = run(&scene, &mut Constant(still()), 0, 50);
     assert_eq!((idle.steps.len(), idle.success, idle.failure), (50, false, Some(FailureClass::NeverReached)));
     scene.block.position_m = [3.0, 0.0, 0.5];
-    let fallen = run(&scene, &mut Constant([0.0; JOINTS]), 0, 200);
+    let fallen = run(&scene, &mut Constant(still()), 0, 200);
     assert!(fallen.steps.len() < 20, "a block that falls past the table ends the episode, not {} steps", fallen.steps.len());
 }
 
@@ -129,7 +136,7 @@ fn a_command_that_is_no_number_ends_the_episode_unrecorded() {
     impl Controller for Breaks {
         fn command(&mut self, _seen: &Observation) -> Action {
             self.0 += 1;
-            if self.0 > 5 { [f64::NAN; JOINTS] } else { [0.0; JOINTS] }
+            if self.0 > 5 { [f64::NAN; 9].into() } else { still() }
         }
     }
     let episode = run(&scene(Task::PickUp, 0), &mut Breaks(0), 0, 50);
@@ -168,7 +175,7 @@ fn an_episode_whose_simulation_breaks_down_is_a_failure_of_its_own_class_and_no_
 fn a_command_that_is_no_number_is_a_failure_of_its_own_class() {
     let scene = scene(Task::PickUp, 0);
     for bad in [f64::NAN, f64::INFINITY, 1e300] {
-        let episode = run(&scene, &mut Constant(std::array::from_fn(|i| if i == 3 { bad } else { 0.0 })), 0, 50);
+        let episode = run(&scene, &mut Constant(Joints::from_fn(9, |i| if i == 3 { bad } else { 0.0 })), 0, 50);
         assert_eq!((episode.failure, episode.steps.len()), (Some(FailureClass::CommandNotFinite), 0), "{bad}");
     }
 }
@@ -178,6 +185,6 @@ fn an_interrupt_ends_an_episode_within_a_step() {
     let (scene, interrupt) = (scene(Task::PickUp, 0), Interrupt::default());
     interrupt.raise(2);
     let mut noise = disturbance(&SimulateSettings::default(), 0);
-    let ended = run_episode(0, &scene, &mut Constant([0.0; JOINTS]), &mut noise, 10_000, &interrupt);
+    let ended = run_episode(0, &scene, &mut Constant(still()), &mut noise, 10_000, &interrupt);
     assert!(matches!(ended, Err(Error::Interrupted)));
 }

@@ -7,18 +7,26 @@ mod robot;
 mod scripted;
 
 use hilt::config::SceneSettings;
-use hilt::robot::{Arm, LINK_SHAPES, LinkPoses, Shape};
+use hilt::robot::Robot;
+use hilt::robot::file::built_in::paper_robot;
 use hilt::scene::{BLOCK_EDGE_M, Scene};
 use hilt::sim::{Controller, World};
 use hilt::state::Pose;
 use hilt::tasks::{Observation, Task, draw_scene};
 use nalgebra::{Isometry3, Point3};
 use scripted::Script;
+use std::sync::Arc;
 
-/// The scene of random position (and yaw) number `index`.
+/// The scene of random position (and yaw) number `index`, with the paper's robot.
 fn scene(task: Task, index: u64) -> Scene {
+    scene_of(&paper_robot(), task, index)
+}
+
+/// The same with another.
+fn scene_of(robot: &Arc<Robot>, task: Task, index: u64) -> Scene {
     let settings = SceneSettings { yaw: true, ..SceneSettings::default() };
-    draw_scene(task, &settings, &mut hilt::seed::stream(7, "physics test", index)).expect("the default spawn area has room")
+    draw_scene(robot, task, &settings, &mut hilt::seed::stream(7, "physics test", index))
+        .expect("the default spawn area has room")
 }
 
 /// Lets `script` run until it has been on its last leg for `rest` steps, at most 400 steps; returns what is seen then.
@@ -45,16 +53,10 @@ fn lowest_corner(block: &Pose) -> f64 {
     lowest_of_box(&block.isometry(), [0.0; 3], [BLOCK_EDGE_M / 2.0; 3])
 }
 
-/// Height of the lowest point of the arm above its base \[m\].
-fn lowest_of_robot(poses: &LinkPoses) -> f64 {
-    let moving = LINK_SHAPES.iter().filter(|s| s.link > 1);
-    let height = |point: [f64; 3], link: usize| (poses[link] * Point3::from(point)).z;
-    moving.fold(f64::INFINITY, |least, s| {
-        least.min(match s.shape {
-            Shape::Capsule { from_m, to_m, radius_m } => height(from_m, s.link).min(height(to_m, s.link)) - radius_m,
-            Shape::Box { center_m, half_m } => lowest_of_box(&poses[s.link], center_m, half_m),
-        })
-    })
+/// Height of the lowest point of the robot above its shoulder's link \[m\].
+fn lowest_of_robot(poses: &[Isometry3<f64>]) -> f64 {
+    let moving = paper_robot().solids(poses).into_iter().filter(|(link, _)| *link > 1);
+    moving.map(|(_, solid)| solid.lowest_m()).fold(f64::INFINITY, f64::min)
 }
 
 fn lowest_of_box(pose: &Isometry3<f64>, center: [f64; 3], half: [f64; 3]) -> f64 {
@@ -65,6 +67,6 @@ fn lowest_of_box(pose: &Isometry3<f64>, center: [f64; 3], half: [f64; 3]) -> f64
 
 /// The block as the hand sees it.
 fn in_hand(seen: &Observation) -> Pose {
-    let hand = Arm::new().tool_pose(&seen.state.q_rad);
+    let hand = seen.robot.tool_pose(&seen.state.q);
     Pose::from_isometry(&(hand.inverse() * seen.state.block.isometry()))
 }

@@ -30,7 +30,7 @@ fn future(world: &mut World, script: &mut Script, steps: usize) -> Vec<u32> {
     for _ in 0..steps {
         let seen = world.observe();
         bits.extend(seen.state.to_row().iter().map(|v| v.to_bits()));
-        bits.extend(seen.contacts.finger_block_n.map(|f| (f as f32).to_bits()));
+        bits.extend(seen.contacts.finger_block_n.iter().map(|f| (*f as f32).to_bits()));
         world.step(&script.command(&seen));
     }
     bits
@@ -41,7 +41,7 @@ fn an_episode_repeats_bit_for_bit_on_any_thread() {
     let run = || {
         let scene = scene(Task::Stack, 3);
         let mut script = Script::carry(&scene.block, scene.target_m());
-        let mut noise = Disturbance::new(&SimulateSettings::default(), hilt::seed::stream(0, "simulate", 3));
+        let mut noise = Disturbance::new(&scene.robot, &SimulateSettings::default(), hilt::seed::stream(0, "simulate", 3));
         run_episode(3, &scene, &mut script, &mut noise, 300, &Interrupt::default()).expect("not interrupted")
     };
     let here = run();
@@ -54,14 +54,13 @@ fn an_episode_repeats_bit_for_bit_on_any_thread() {
 fn recorded_actions_reproduce_the_recorded_states() {
     let scene = scene(Task::PickUp, 4);
     let mut script = Script::lift(&scene.block);
-    let mut noise = Disturbance::new(&SimulateSettings::default(), hilt::seed::stream(0, "simulate", 4));
+    let mut noise = Disturbance::new(&scene.robot, &SimulateSettings::default(), hilt::seed::stream(0, "simulate", 4));
     let episode = run_episode(4, &scene, &mut script, &mut noise, 200, &Interrupt::default()).expect("not interrupted");
     let demo = episode.to_demo().expect("a sound episode");
     let mut world = World::new(&scene);
     for t in 0..demo.len() {
         assert_eq!(world.observe().state.to_row(), demo.state(t), "state {t}");
-        let executed: Vec<f64> = demo.executed()[t * 9..(t + 1) * 9].iter().map(|v| f64::from(*v)).collect();
-        world.step(&executed.try_into().expect("nine joints"));
+        world.step(&demo.executed()[t * 9..(t + 1) * 9].iter().map(|v| f64::from(*v)).collect());
     }
     assert_eq!(world.observe().state.to_row(), demo.state(demo.len()));
 }
@@ -107,7 +106,7 @@ fn a_recorded_state_can_be_set_exactly() {
             mid_carry(task, index)
         };
         let row = world.observe().state.to_row();
-        let recorded = State::from_row(task, &row).expect("a row of this task");
+        let recorded = State::from_row(task, 9, &row).expect("a row of this task");
         let mut set = World::new(&scene(task, index));
         set.set_state(&recorded);
         let seen = set.observe().state;

@@ -3,11 +3,12 @@
 use crate::scripted::Script;
 use crate::{lowest_corner, lowest_of_robot, play, scene};
 use hilt::config::SimulateSettings;
+use hilt::joints::Joints;
 use hilt::math::sin_cos;
-use hilt::robot::{POSITION_LIMITS_RAD, VELOCITY_LIMITS_RAD_S};
+use hilt::robot::file::built_in::paper_robot;
 use hilt::scene::{Obstacle, Scene};
 use hilt::sim::{Controller, Disturbance, World};
-use hilt::state::{ARM_JOINTS, Action, CONTROL_DT_S, JOINTS};
+use hilt::state::{Action, CONTROL_DT_S};
 use hilt::tasks::{Observation, Task};
 use rand::RngExt;
 use std::f64::consts::PI;
@@ -16,6 +17,14 @@ use std::f64::consts::PI;
 const TRACKING_RAD: f64 = 1e-3;
 /// Dry friction may hold a finger that is commanded slower than this \[rad/s\].
 const STICTION_RAD_S: f64 = 0.15;
+
+/// Joints of the Jaco, and of its arm.
+const JOINTS: usize = 9;
+const ARM_JOINTS: usize = 6;
+
+fn velocities() -> Joints {
+    paper_robot().joints.iter().map(|joint| joint.velocity).collect()
+}
 
 fn step(world: &mut World, action: &Action) -> Observation {
     world.step(action);
@@ -33,8 +42,8 @@ fn empty() -> Scene {
 fn each_joint_answers_to_its_own_command_alone() {
     for joint in 0..JOINTS {
         let mut world = World::new(&empty());
-        let before = world.observe().state.q_rad;
-        let mut action = [0.0; JOINTS];
+        let before = world.observe().state.q;
+        let mut action = Joints::zeros(JOINTS);
         action[joint] = 0.3;
         for _ in 0..10 {
             world.step(&action);
@@ -42,9 +51,9 @@ fn each_joint_answers_to_its_own_command_alone() {
         let seen = world.observe().state;
         for other in 0..JOINTS {
             let expected = if other == joint { 0.3 * 10.0 * CONTROL_DT_S } else { 0.0 };
-            let moved = seen.q_rad[other] - before[other];
+            let moved = seen.q[other] - before[other];
             assert!((moved - expected).abs() < TRACKING_RAD, "joint {joint} driven: joint {other} moved {moved} rad");
-            assert!((seen.dq_rad_s[other] - action[other]).abs() < 1e-2, "joint {other} turns at {} rad/s", seen.dq_rad_s[other]);
+            assert!((seen.dq[other] - action[other]).abs() < 1e-2, "joint {other} turns at {} rad/s", seen.dq[other]);
         }
     }
 }
@@ -52,14 +61,14 @@ fn each_joint_answers_to_its_own_command_alone() {
 /// Commands as a plan under noise has them: 80 % of the velocity limits within 2 s swings, plus N(0, 0.001).
 #[test]
 fn free_motion_tracks_its_command_in_one_step() {
-    let mut noise = Disturbance::new(&SimulateSettings::default(), hilt::seed::stream(0, "tracking", 0));
+    let mut noise = Disturbance::new(&paper_robot(), &SimulateSettings::default(), hilt::seed::stream(0, "tracking", 0));
     let mut world = World::new(&empty());
-    let mut before = world.observe().state.q_rad;
-    let mut still = [false; JOINTS];
+    let mut before = world.observe().state.q;
+    let (mut still, limits) = ([false; JOINTS], velocities());
     for t in 0..200 {
         let swing = 0.8 * sin_cos(PI * f64::from(t) * CONTROL_DT_S).0;
-        let action = noise.apply(&VELOCITY_LIMITS_RAD_S.map(|limit| swing * limit));
-        let after = step(&mut world, &action).state.q_rad;
+        let action = noise.apply(&limits.map(|limit| swing * limit));
+        let after = step(&mut world, &action).state.q;
         for i in 0..JOINTS {
             let (moved, asked) = (after[i] - before[i], CONTROL_DT_S * action[i]);
             if i >= ARM_JOINTS && (action[i].abs() < STICTION_RAD_S || still[i]) {
@@ -82,11 +91,11 @@ fn joints_stop_at_their_limits() {
     for joint in [1, 2, 6, 7, 8] {
         for sign in [-1.0, 1.0] {
             let mut world = World::new(&empty());
-            let mut action = [0.0; JOINTS];
-            action[joint] = sign * VELOCITY_LIMITS_RAD_S[joint];
+            let mut action = Joints::zeros(JOINTS);
+            action[joint] = sign * velocities()[joint];
             for _ in 0..160 {
-                let q = step(&mut world, &action).state.q_rad[joint];
-                let [low, high] = POSITION_LIMITS_RAD[joint];
+                let q = step(&mut world, &action).state.q[joint];
+                let [low, high] = paper_robot().joints[joint].limits;
                 assert!(q > low - 0.05 && q < high + 0.05, "joint {joint} at {q} rad, limits {low}..{high}");
             }
         }
@@ -100,7 +109,7 @@ fn a_stalled_finger_pushes_no_harder_than_its_torque_allows() {
     play(&mut world, &mut Script::lift(&scene.block), 20);
     let squeeze = |rad_s: f64| {
         let mut world = World::restore(&world.snapshot()).expect("a snapshot");
-        let action: Action = std::array::from_fn(|i| if i < ARM_JOINTS { 0.0 } else { rad_s });
+        let action = Joints::from_fn(JOINTS, |i| if i < ARM_JOINTS { 0.0 } else { rad_s });
         (0..20).for_each(|_| world.step(&action));
         world.observe().contacts.finger_block_n[0]
     };
@@ -123,7 +132,7 @@ fn ramming_the_block_into_the_table_breaks_nothing() {
         let seen = world.observe();
         touched |= seen.contacts.robot_table;
         deepest = deepest.min(lowest_corner(&seen.state.block)).min(lowest_of_robot(&world.link_poses()));
-        assert!(seen.state.q_rad.iter().chain(&seen.state.dq_rad_s).all(|v| v.is_finite()));
+        assert!(seen.state.q.iter().chain(&seen.state.dq).all(|v| v.is_finite()));
         world.step(&script.command(&seen));
     }
     assert!(touched, "the hand never reached the table");
@@ -134,17 +143,18 @@ fn ramming_the_block_into_the_table_breaks_nothing() {
 fn random_actions_break_nothing() {
     for seed in 0..4 {
         let mut rng = hilt::seed::stream(seed, "abuse", 0);
-        let mut world = World::new(&scene(Task::Stack, seed));
-        let mut action = [0.0; JOINTS];
+        let (mut world, limits) = (World::new(&scene(Task::Stack, seed)), velocities());
+        let mut action = Joints::zeros(JOINTS);
         let (mut deepest, mut overshoot): (f64, f64) = (0.0, 0.0);
         for t in 0..300 {
             if t % 10 == 0 {
-                action = std::array::from_fn(|i| VELOCITY_LIMITS_RAD_S[i] * (2.0 * rng.random::<f64>() - 1.0));
+                action = Joints::from_fn(JOINTS, |i| limits[i] * (2.0 * rng.random::<f64>() - 1.0));
             }
             let seen = step(&mut world, &action);
-            assert!(seen.state.q_rad.iter().chain(&seen.state.block.to_array()).all(|v| v.is_finite()));
+            assert!(seen.state.q.iter().chain(&seen.state.block.to_array()).all(|v| v.is_finite()));
             deepest = deepest.min(lowest_corner(&seen.state.block)).min(lowest_of_robot(&world.link_poses()));
-            for (q, [low, high]) in seen.state.q_rad.iter().zip(POSITION_LIMITS_RAD) {
+            for (q, joint) in seen.state.q.iter().zip(&paper_robot().joints) {
+                let [low, high] = joint.limits;
                 overshoot = overshoot.max(low - q).max(q - high);
             }
         }
@@ -159,7 +169,7 @@ fn touching_an_obstacle_is_seen() {
     scene.obstacles = vec![Obstacle { center_m: [0.45, 0.25, 0.2], size_m: [0.3, 0.1, 0.4] }];
     for (speed, expected) in [(0.5, false), (-0.5, true), (0.0, false)] {
         let mut world = World::new(&scene);
-        let mut action = [0.0; JOINTS];
+        let mut action = Joints::zeros(JOINTS);
         action[0] = speed;
         let touched = (0..40).any(|_| step(&mut world, &action).contacts.robot_obstacle);
         assert_eq!(touched, expected, "joint 1 at {speed} rad/s");

@@ -1,8 +1,8 @@
 //! A hand-written grasp for tests and benchmarks: straight moves of the tool by damped least squares, fingers on conditions.
 
-use hilt::robot::Arm;
+use hilt::joints::Joints;
 use hilt::sim::Controller;
-use hilt::state::{ARM_JOINTS, Action, FINGERS, JOINTS, Pose};
+use hilt::state::{Action, Pose};
 use hilt::tasks::Observation;
 use nalgebra::{Matrix6, UnitQuaternion, Vector3, Vector6};
 
@@ -10,7 +10,7 @@ use nalgebra::{Matrix6, UnitQuaternion, Vector3, Vector6};
 pub const GRASP_HEIGHT_M: f64 = 0.022;
 /// Height of the tool point in transit \[m\].
 const TRANSIT_HEIGHT_M: f64 = 0.22;
-/// Finger velocities \[rad/s\].
+/// Finger velocities \[rad/s, and what counts as one\].
 const CLOSE: f64 = 0.7;
 const CARRY: f64 = 0.3;
 const OPEN: f64 = -0.6;
@@ -33,7 +33,6 @@ pub struct Leg {
 /// Goes through its legs and stays in the last.
 #[derive(Clone)]
 pub struct Script {
-    arm: Arm,
     yaw: f64,
     pub legs: Vec<Leg>,
     pub at: usize,
@@ -52,7 +51,7 @@ impl Script {
             leg([x, y, low], CLOSE, 30),
             leg([x, y, TRANSIT_HEIGHT_M + 0.02], CARRY, 0),
         ];
-        Script { arm: Arm::new(), yaw, legs, at: 0, waited: 0 }
+        Script { yaw, legs, at: 0, waited: 0 }
     }
 
     /// [`Script::lift`], then to above `goal_m` (of the block's centre), down, open, up.
@@ -90,15 +89,15 @@ impl Controller for Script {
         let now = self.legs[self.at];
         let mut linear = GAIN * error(&now);
         linear *= (SPEED_M_S / linear.norm().max(SPEED_M_S)).min(1.0);
-        let (tool, jacobian) = self.arm.tool_jacobian(&seen.state.q_rad);
+        let (tool, jacobian) = seen.robot.tool_jacobian(&seen.state.q);
         let turn = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), self.yaw) * tool.rotation.inverse();
         let angular = GAIN * turn.scaled_axis();
         let twist = Vector6::new(linear.x, linear.y, linear.z, angular.x, angular.y, angular.z);
-        let normal = jacobian * jacobian.transpose() + Matrix6::identity() * DAMPING;
+        let normal: Matrix6<f64> = &jacobian * jacobian.transpose() + Matrix6::identity() * DAMPING;
         let arm = jacobian.transpose() * normal.cholesky().expect("a damped matrix is positive definite").solve(&twist);
-        let mut action = [0.0; JOINTS];
-        action[..ARM_JOINTS].copy_from_slice(arm.as_slice());
-        action[ARM_JOINTS..].copy_from_slice(&[now.finger_rad_s; FINGERS]);
-        action
+        let robot = &seen.robot;
+        let finger =
+            |joint: usize| now.finger_rad_s * robot.joints[joint].per_radian() * robot.closing_way(joint - robot.arm).signum();
+        Joints::from_fn(robot.joints.len(), |i| if i < robot.arm { arm[i] } else { finger(i) })
     }
 }

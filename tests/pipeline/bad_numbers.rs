@@ -6,7 +6,6 @@ use arrow_array::types::Float32Type;
 use arrow_array::{Array, ArrayRef, FixedSizeListArray, Float32Array, RecordBatch};
 use hilt::data::{recording, seal, table_file, weights};
 use hilt::demo::Step;
-use hilt::robot::urdf::urdf;
 use hilt::table::Values;
 use hilt::tasks::FailureClass;
 use parquet::arrow::ArrowWriter;
@@ -29,13 +28,13 @@ fn plans_with_a_number_that_is_none_are_refused() {
 
 #[test]
 fn recordings_with_a_number_that_is_none_are_refused() {
-    let harms: [fn(&mut Step); 2] = [|s| s.state.dq_rad_s[2] = f64::NAN, |s| s.commanded[4] = f64::INFINITY];
+    let harms: [fn(&mut Step); 2] = [|s| s.state.dq[2] = f64::NAN, |s| s.commanded[4] = f64::INFINITY];
     for harm in harms {
         let run = Run::finished();
         let path = run.at("recordings/episode-00001.mcap");
         let (mut episode, origin) = recording::read(&path).expect("a recording");
         harm(&mut episode.steps[5]);
-        recording::write(&path, &episode, &urdf(), &origin).expect("written");
+        recording::write(&path, &episode, &origin).expect("written");
         run.refuses(run.words("convert"), &["episode-00001.mcap", "step 5", "not a finite number"]);
     }
 }
@@ -117,7 +116,7 @@ fn a_failed_episode_is_left_out_with_its_class_in_words() {
     let (mut episode, origin) = recording::read(&path).expect("a recording");
     for class in FailureClass::ALL {
         (episode.success, episode.failure) = (false, Some(class));
-        recording::write(&path, &episode, &urdf(), &origin).expect("written");
+        recording::write(&path, &episode, &origin).expect("written");
         assert_eq!(recording::read(&path).expect("read again").0.failure, Some(class));
         let output = hilt(run.words("convert"));
         let stderr = text(&output.stderr);

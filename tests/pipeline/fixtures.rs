@@ -3,7 +3,7 @@
 use crate::runs::{HILT, contents, text};
 use hilt::data::dataset::{self, Dataset, DatasetEpisode};
 use hilt::data::{recording, table_file, weights};
-use hilt::robot::urdf::urdf;
+use hilt::robot::file::built_in::paper_robot;
 use hilt::table::Values;
 use hilt::tensor::NamedTensor;
 use std::fs;
@@ -37,7 +37,7 @@ fn every_format_is_written_as_it_was() {
 
     let (from, to) = at("recordings/episode-00000.mcap");
     let (episode, origin) = recording::read(&from).expect("a recording");
-    recording::write(&to, &episode, &urdf(), &origin).expect("written");
+    recording::write(&to, &episode, &origin).expect("written");
 
     let (from, to) = at("dataset/validation");
     let Dataset { task, demos, rewards, successes, source_episodes, provenance, .. } = dataset::read(&from).expect("a dataset");
@@ -49,13 +49,25 @@ fn every_format_is_written_as_it_was() {
             success: successes[i],
         })
         .collect();
-    dataset::write(&to, task, &rows.as_slice().into(), &provenance).expect("written");
+    dataset::write(&to, (&paper_robot(), task), &rows.as_slice().into(), &provenance).expect("written");
 
     let (from, to) = at("policy.safetensors");
     let (tensors, meta, origin) = weights::read(&from, "policy").expect("weights");
     weights::write(&to, "policy", &tensors, &meta, &origin).expect("written");
 
     assert_eq!(differing(&old, new.path()), [] as [PathBuf; 0], "fixtures/README.md says what to do");
+}
+
+/// From before recordings and datasets said whose they are.
+#[test]
+fn files_of_the_version_before_are_of_the_papers_robot() {
+    let older = fixtures().join("older");
+    let (episode, _) = recording::read(&older.join("episode-00000.mcap")).expect("a recording");
+    let found = dataset::read(&older.join("dataset")).expect("a dataset");
+    assert_eq!(episode.scene.robot, paper_robot());
+    assert_eq!(found.layout, found.task.layout(&paper_robot()));
+    let demo = episode.to_demo().expect("a demo");
+    assert_eq!((found.demos[0].states(), found.demos[0].layout()), (demo.states(), demo.layout()));
 }
 
 #[test]

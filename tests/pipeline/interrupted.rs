@@ -3,6 +3,7 @@
 use crate::runs::{HILT, Run, contents, text};
 use hilt::data::{recording, table_file};
 use hilt::plan::{from_table, to_table};
+use hilt::robot::file::built_in::paper_robot;
 use std::fs;
 use std::os::unix::fs::symlink;
 use std::path::Path;
@@ -89,9 +90,9 @@ fn simulation_stops() {
     let run = Run::finished();
     let path = run.at("plans.parquet");
     let (table, origin) = table_file::read(&path).expect("plans");
-    let plan = from_table(&table).expect("plans").swap_remove(0);
+    let plan = from_table(&paper_robot(), &table).expect("plans").swap_remove(0);
     let plans: Vec<_> = (0..1000).map(|index| hilt::plan::Plan { index, ..plan.clone() }).collect();
-    table_file::write(&path, &to_table(&plans), &origin).expect("written");
+    table_file::write(&path, &to_table(&paper_robot(), &plans), &origin).expect("written");
     interrupted_by("INT", &run, run.words("simulate"), SOON);
 }
 
@@ -102,7 +103,7 @@ fn distinct(one: &Path) -> tempfile::TempDir {
     for index in 0..DISTINCT {
         episode.index = index;
         episode.steps[0].commanded[0] += 1e-3;
-        recording::write(&dir.path().join(recording::file_name(index)), &episode, "<robot/>", &origin).expect("written");
+        recording::write(&dir.path().join(recording::file_name(index)), &episode, &origin).expect("written");
     }
     dir
 }

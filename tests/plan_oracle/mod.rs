@@ -1,16 +1,17 @@
 //! An independent look at a plan's clearances: parry's shapes and distances.
 
 use hilt::demo::Phase;
+use hilt::joints::Joints;
 use hilt::plan::{Plan, RESOLUTION_M};
-use hilt::robot::jaco::HAND_LINK;
-use hilt::robot::kinematics::tool_of;
-use hilt::robot::{Arm, LINK_SHAPES, Shape};
+use hilt::robot::Robot;
+use hilt::robot::model::Shape;
 use hilt::scene::{BLOCK_EDGE_M, Scene};
-use hilt::state::{Context, JOINTS};
+use hilt::state::Context;
 use nalgebra::Isometry3;
 use rapier3d::math::{Pose, Vector};
 use rapier3d::parry::query;
 use rapier3d::parry::shape::{Capsule, Cuboid, SharedShape};
+use std::sync::Arc;
 
 /// Single precision of the oracle \[m\].
 const PRECISION_M: f64 = 5e-4;
@@ -21,7 +22,7 @@ const HAND_TABLE_M: f64 = 0.001;
 
 /// What stands in a scene, as parry sees it.
 pub struct Oracle {
-    arm: Arm,
+    robot: Arc<Robot>,
     obstacles: Vec<(Pose, SharedShape)>,
     base: Option<(Pose, SharedShape)>,
     table: (Pose, SharedShape),
@@ -32,7 +33,7 @@ impl Oracle {
         let cuboid = |half: [f64; 3]| SharedShape::new(Cuboid::new(vector(half)));
         let place = |at: [f64; 3]| pose(&Isometry3::translation(at[0], at[1], at[2]));
         Oracle {
-            arm: Arm::new(),
+            robot: Arc::clone(&scene.robot),
             obstacles: scene.obstacles.iter().map(|o| (place(o.center_m), cuboid(o.size_m.map(|s| s / 2.0)))).collect(),
             base: match scene.context {
                 Context::Base(base) => Some((pose(&base.isometry()), cuboid([BLOCK_EDGE_M / 2.0; 3]))),
@@ -44,34 +45,35 @@ impl Oracle {
 
     /// Panics where the arm or the carried block comes nearer than `clearance_m` to anything, between samples too.
     pub fn check(&self, plan: &Plan, clearance_m: f64) {
-        let grasp = plan.waypoints.iter().rev().find(|w| w.phase == Phase::Approach).expect("an approach").q_rad;
-        let held = self.arm.tool_pose(&grasp).inverse() * plan.scene.block.isometry();
+        let grasp = plan.waypoints.iter().rev().find(|w| w.phase == Phase::Approach).expect("an approach").q;
+        let held = self.robot.tool_pose(&grasp).inverse() * plan.scene.block.isometry();
         for pair in plan.waypoints.windows(2) {
-            let (from, to) = (&pair[0].q_rad, &pair[1].q_rad);
-            let way = (self.arm.tool_pose(to).translation.vector - self.arm.tool_pose(from).translation.vector).norm();
+            let (from, to) = (&pair[0].q, &pair[1].q);
+            let way = (self.robot.tool_pose(to).translation.vector - self.robot.tool_pose(from).translation.vector).norm();
             let pieces = (way / RESOLUTION_M).ceil().max(1.0) as usize;
             for k in 1..=pieces {
                 let share = k as f64 / pieces as f64;
-                let q: [f64; JOINTS] = std::array::from_fn(|j| from[j] + share * (to[j] - from[j]));
+                let q = Joints::from_fn(from.len(), |j| from[j] + share * (to[j] - from[j]));
                 self.check_pose(plan, &q, (pair[1].phase == Phase::Carry).then_some(&held), clearance_m);
             }
         }
     }
 
-    fn check_pose(&self, plan: &Plan, q: &[f64; JOINTS], held: Option<&Isometry3<f64>>, clearance_m: f64) {
-        let poses = self.arm.link_poses(q);
-        let tool = tool_of(&poses);
+    fn check_pose(&self, plan: &Plan, q: &Joints, held: Option<&Isometry3<f64>>, clearance_m: f64) {
+        let poses = self.robot.link_poses(q);
+        let tool = self.robot.tool_of(&poses);
         let near = |[x, y, z]: [f64; 3]| {
             let at = tool.translation.vector;
             hilt::math::hypot(at.x - x, at.y - y) < ZONE_M[0] && at.z - z < ZONE_M[1]
         };
         let releasing = near(plan.scene.target_m());
-        for spec in LINK_SHAPES.iter().filter(|s| s.link > 0) {
-            let solid = shape(&spec.shape, &poses[spec.link]);
-            let hand = spec.link >= HAND_LINK;
+        let moving = self.robot.links.iter().enumerate().skip(1);
+        for (link, primitive) in moving.flat_map(|(link, l)| l.shapes.iter().map(move |shape| (link, shape))) {
+            let solid = shape(primitive, &poses[link]);
+            let hand = link >= self.robot.hand();
             let (table, base) =
                 (if hand { HAND_TABLE_M } else { clearance_m }, if hand && releasing { HAND_TABLE_M } else { clearance_m });
-            self.check_solid(&solid, &format!("link {}", spec.link), [table, base, clearance_m]);
+            self.check_solid(&solid, &self.robot.links[link].name, [table, base, clearance_m]);
         }
         if let Some(held) = held {
             let solid = (pose(&(tool * held)), SharedShape::new(Cuboid::new(vector([BLOCK_EDGE_M / 2.0; 3]))));
@@ -110,8 +112,6 @@ fn shape(shape: &Shape, link: &Isometry3<f64>) -> (Pose, SharedShape) {
         Shape::Capsule { from_m, to_m, radius_m } => {
             (pose(link), SharedShape::new(Capsule::new(vector(*from_m), vector(*to_m), *radius_m as f32)))
         }
-        Shape::Box { center_m: [x, y, z], half_m } => {
-            (pose(&(link * nalgebra::Translation3::new(*x, *y, *z))), SharedShape::new(Cuboid::new(vector(*half_m))))
-        }
+        Shape::Box { pose: at, half_m } => (pose(&(link * at)), SharedShape::new(Cuboid::new(vector(*half_m)))),
     }
 }

@@ -1,16 +1,19 @@
 //! What must hold of a dataset before anything learns from it: `meta/info.json` against the task, numbers against each other.
 
 use super::features::{Feature, features};
-use super::meta::{CODEBASE_VERSION, INFO};
+use super::meta::{CODEBASE_VERSION, INFO, LAYOUT};
 use crate::data::bytes::Format;
 use crate::data::{ContentHash, Provenance, json_file, provenance, seal};
 use crate::error::{Error, Result};
+use crate::layout::Layout;
+use crate::robot::file::built_in::paper_robot;
 use crate::state::CONTROL_HZ;
 use crate::task::Task;
 use serde::Deserialize;
 use serde_json::Value;
 use std::collections::BTreeMap;
 use std::path::Path;
+use std::sync::Arc;
 
 /// The JSON files of a dataset from outside.
 pub(super) const DESCRIPTION: Format = Format {
@@ -23,6 +26,7 @@ pub(super) const DESCRIPTION: Format = Format {
 /// `meta/info.json`, as far as hilt reads it.
 pub(super) struct Info {
     pub(super) task: Task,
+    pub(super) layout: Arc<Layout>,
     pub(super) fps: u32,
     pub(super) episodes: usize,
     pub(super) frames: usize,
@@ -56,7 +60,8 @@ pub(super) fn info(root: &Path) -> Result<Info> {
     }
     let counts: Counts = serde_json::from_value(value.clone()).map_err(invalid)?;
     let found = json_file::provenance_of(&path, value.get(provenance::KEY).cloned())?;
-    check_features(&path, found.task, value.get("features"))?;
+    let layout = layout(&path, found.task, &value)?;
+    check_features(&path, &layout, value.get("features"))?;
     if counts.fps != CONTROL_HZ {
         return Err(Error::input(&path, format!("has {} frames per second, hilt works at {CONTROL_HZ}", counts.fps)));
     }
@@ -65,7 +70,7 @@ pub(super) fn info(root: &Path) -> Result<Info> {
     let files: BTreeMap<String, String> = serde_json::from_value(files).map_err(invalid)?;
     let Counts { fps, total_episodes: episodes, total_frames: frames } = counts;
     let hash = ContentHash::of(&bytes);
-    Ok(Info { task: found.task, fps, episodes, frames, provenance: found, files, hash })
+    Ok(Info { task: found.task, layout, fps, episodes, frames, provenance: found, files, hash })
 }
 
 fn no_dataset(root: &Path) -> String {
@@ -79,9 +84,24 @@ fn no_dataset(root: &Path) -> String {
     format!("is no dataset: {INFO} is missing")
 }
 
-/// The declared features against those of the task.
-fn check_features(path: &Path, task: Task, declared: Option<&Value>) -> Result<()> {
-    for Feature { name, kind, width, .. } in features(task) {
+/// What its rows hold; a dataset that does not say is of the paper's robot, when there was no other.
+fn layout(path: &Path, task: Task, value: &Value) -> Result<Arc<Layout>> {
+    let Some(said) = value.get(provenance::KEY).and_then(|hilt| hilt.get(LAYOUT)) else {
+        return Ok(task.layout(&paper_robot()));
+    };
+    let layout: Layout =
+        serde_json::from_value(said.clone()).map_err(|e| Error::input(path, format!("its layout cannot be read: {e}")))?;
+    if layout.name != task.name() {
+        return Err(Error::input(path, format!("its layout is of {}, its provenance of {task}", layout.name)));
+    }
+    layout.check().map_err(|why| Error::input(path, format!("its layout cannot be: {why}")))?;
+    Ok(Arc::new(layout))
+}
+
+/// The declared features against those of the layout.
+fn check_features(path: &Path, layout: &Layout, declared: Option<&Value>) -> Result<()> {
+    let task = &layout.name;
+    for Feature { name, kind, width, .. } in features(layout) {
         let entry = declared.and_then(|d| d.get(name));
         let entry = entry.ok_or_else(|| Error::input(path, format!("does not declare the feature {name} that {task} has")))?;
         let shape: Vec<usize> = entry.get("shape").and_then(|s| serde_json::from_value(s.clone()).ok()).unwrap_or_default();

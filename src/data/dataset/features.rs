@@ -1,14 +1,11 @@
 //! The columns of a dataset: names, shapes, and how an episode fills them.
 
 use super::episode::DatasetEpisode;
-use crate::state::{CONTROL_HZ, JOINTS, State, action_names};
-use crate::task::Task;
+use crate::layout::{Layout, Span};
+use crate::state::CONTROL_HZ;
 use arrow_array::{ArrayRef, BooleanArray, FixedSizeListArray, Float32Array, Int64Array};
 use arrow_schema::{DataType, Field, Metadata};
 use std::sync::Arc;
-
-/// Entries of `observation.state`: joint angles and velocities.
-pub(super) const PROPRIOCEPTION: usize = 2 * JOINTS;
 
 pub(super) const STATE: &str = "observation.state";
 pub(super) const ENVIRONMENT: &str = "observation.environment_state";
@@ -70,18 +67,28 @@ pub(super) struct Feature {
     pub(super) doc: &'static str,
 }
 
+/// Entries of `observation.state`: joint positions and velocities.
+fn proprioception(layout: &Layout) -> usize {
+    layout.velocities().end.max(layout.positions().end)
+}
+
+/// Names of the entries of these spans.
+pub(in crate::data) fn names(spans: &[Span]) -> Vec<String> {
+    spans.iter().flat_map(|span| span.entries.iter().cloned()).collect()
+}
+
 /// All columns, in order.
-pub(super) fn features(task: Task) -> Vec<Feature> {
-    let names = State::column_names(task);
-    let (body, world) = names.split_at(PROPRIOCEPTION);
+pub(super) fn features(layout: &Layout) -> Vec<Feature> {
+    let (states, actions) = (names(&layout.state), names(&layout.action));
+    let (body, world) = states.split_at(proprioception(layout));
     let vector =
         |name, names: &[String], doc| Feature { name, kind: Kind::F32, width: names.len(), names: Some(names.to_vec()), doc };
     let scalar = |name, kind, doc| Feature { name, kind, width: 1, names: None, doc };
     vec![
-        vector(STATE, body, "joint angles [rad], then joint velocities [rad/s], before the action"),
+        vector(STATE, body, "joint positions [rad, m], then joint velocities [rad/s, m/s], before the action"),
         vector(ENVIRONMENT, world, "pose of the block [m, unit quaternion], then the task's constants (goal or base block)"),
-        vector(ACTION, &action_names(), "joint velocities that the controller asked for [rad/s]"),
-        vector(EXECUTED, &action_names(), "joint velocities that the motors were given: action + noise, clamped [rad/s]"),
+        vector(ACTION, &actions, "joint velocities that the controller asked for [rad/s, m/s]"),
+        vector(EXECUTED, &actions, "joint velocities that the motors were given: action + noise, clamped [rad/s, m/s]"),
         vector(NEXT_STATE, body, "observation.state after the action; keeps the last state of an episode"),
         vector(NEXT_ENVIRONMENT, world, "observation.environment_state after the action"),
         scalar(REWARD, Kind::F32, "reward of milestones reached by the action"),
@@ -192,11 +199,10 @@ pub(super) fn field(feature: &Feature) -> Field {
 /// The columns of one episode. `number` is its place in the dataset, `first` that of its first frame.
 pub(super) fn cells(features: &[Feature], episode: &DatasetEpisode, number: usize, first: usize) -> Vec<Cells> {
     let (demo, t_end) = (&episode.demo, episode.demo.len());
+    let own = proprioception(demo.layout());
     let part = |from: usize, environment: bool| {
         let rows = (from..from + t_end).map(|t| demo.state(t));
-        Cells::F32(
-            rows.flat_map(|row| if environment { &row[PROPRIOCEPTION..] } else { &row[..PROPRIOCEPTION] }).copied().collect(),
-        )
+        Cells::F32(rows.flat_map(|row| if environment { &row[own..] } else { &row[..own] }).copied().collect())
     };
     let each = |value: fn(usize, usize) -> i64, offset: usize| Cells::I64((0..t_end).map(|t| value(t, offset)).collect());
     let at_end = |flag: bool| Cells::Bool((0..t_end).map(|t| flag && t + 1 == t_end).collect());

@@ -5,6 +5,8 @@ use super::files::{FILES_PER_CHUNK, is_of_series};
 use super::stats::{NAMES, Stats};
 use crate::data::{Provenance, atomic, parquet_file, seal};
 use crate::error::Result;
+use crate::layout::Layout;
+use crate::robot::Robot;
 use crate::state::CONTROL_HZ;
 use crate::task::Task;
 use arrow_array::{ArrayRef, Int64Array, RecordBatch, StringArray};
@@ -34,7 +36,8 @@ pub(super) const DATA_FILE_MB: usize = 100;
 /// LeRobot's own size at which a video file is closed \[MB\]; there are no videos.
 const VIDEO_FILE_MB: usize = 200;
 const DATA_PATH: &str = "data/chunk-{chunk_index:03d}/file-{file_index:03d}.parquet";
-const ROBOT: &str = "kinova_j2n6s300";
+/// Key of what the rows hold.
+pub(super) const LAYOUT: &str = "layout";
 
 /// Whether a path below a dataset's root is one of a dataset.
 pub(super) fn is_file(path: &Path) -> bool {
@@ -52,7 +55,7 @@ fn put(dir: &Path, name: &str, bytes: &[u8], files: &mut BTreeMap<String, String
 /// with these hashes.
 pub(super) fn write(
     dir: &Path,
-    task: Task,
+    (robot, task, layout): (&Robot, Task, &Layout),
     features: &[Feature],
     (episodes, frames): (usize, usize),
     whole: &[Stats],
@@ -65,7 +68,7 @@ pub(super) fn write(
     put(dir, STATS, &pretty(&whole_stats(features, whole)), &mut files)?;
     let info = Info {
         codebase_version: CODEBASE_VERSION,
-        robot_type: ROBOT,
+        robot_type: &robot.name,
         total_episodes: episodes,
         total_frames: frames,
         total_tasks: 1,
@@ -77,16 +80,16 @@ pub(super) fn write(
         data_path: DATA_PATH,
         video_path: None,
         features: InOrder(features.iter().map(|f| (f.name.to_string(), describe(f))).collect()),
-        hilt: json!({ "files": files, "provenance": provenance, "seal": seal::blank() }),
+        hilt: json!({ (LAYOUT): layout, "files": files, "provenance": provenance, "seal": seal::blank() }),
     };
     atomic::write_new(&dir.join(INFO), &seal::close(pretty(&info)))
 }
 
 /// `meta/info.json`.
 #[derive(Serialize)]
-struct Info {
+struct Info<'a> {
     codebase_version: &'static str,
-    robot_type: &'static str,
+    robot_type: &'a str,
     total_episodes: usize,
     total_frames: usize,
     total_tasks: usize,

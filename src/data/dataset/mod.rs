@@ -22,6 +22,7 @@ mod whole;
 mod write;
 
 pub use episode::{DatasetEpisode, Episodes};
+pub(in crate::data) use features::names;
 pub use meta::{TRAIN, VALIDATION};
 pub use read::{Dataset, Description, each, read, read_for};
 pub use split::split;
@@ -30,6 +31,7 @@ pub use twins::{Fingerprint, first_shared, first_twins};
 use super::{Provenance, atomic};
 use crate::error::Result;
 use crate::interrupt::Interrupt;
+use crate::robot::Robot;
 use crate::task::Task;
 use std::path::Path;
 use write::Content;
@@ -50,14 +52,14 @@ pub fn frames(root: &Path) -> Result<usize> {
     check::info(root).map(|info| info.frames)
 }
 
-/// Writes one dataset; an older one there is replaced when the new one is whole.
+/// Writes one dataset of a robot in a task; an older one there is replaced when the new one is whole.
 ///
 /// # Errors
 /// [`crate::error::Error::Input`] without episodes, for a demo of another task, for rewards that do not fit or are not finite, or when the place
 /// holds something else; [`crate::error::Error::Io`] when the system refuses; what giving an episode returns.
-pub fn write(root: &Path, task: Task, episodes: &Episodes, provenance: &Provenance) -> Result<()> {
+pub fn write(root: &Path, of: (&Robot, Task), episodes: &Episodes, provenance: &Provenance) -> Result<()> {
     let interrupt = Interrupt::default();
-    let content = Content::new(task, provenance, &interrupt);
+    let content = Content::new(of, provenance, &interrupt);
     atomic::write_dir(root, meta::is_file, |dir| content.fill(dir, episodes))
 }
 
@@ -68,13 +70,13 @@ pub fn write(root: &Path, task: Task, episodes: &Episodes, provenance: &Provenan
 /// As [`write()`]; [`crate::error::Error::Interrupted`].
 pub fn write_split<'a>(
     parent: &Path,
-    task: Task,
+    of: (&Robot, Task),
     train: &Episodes<'a>,
     validation: &Episodes<'a>,
     provenance: &Provenance,
     interrupt: &Interrupt,
 ) -> Result<()> {
-    let content = Content::new(task, provenance, interrupt);
+    let content = Content::new(of, provenance, interrupt);
     atomic::write_dir(parent, is_file, |dir| {
         for (name, episodes) in [(TRAIN, train), (VALIDATION, validation)] {
             if name == TRAIN || !episodes.steps.is_empty() {

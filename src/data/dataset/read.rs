@@ -7,15 +7,19 @@ use super::rows::Rows;
 use crate::data::{ContentHash, Provenance, parquet_file};
 use crate::demo::Demo;
 use crate::error::{Error, Result};
+use crate::layout::Layout;
 use crate::task::Task;
 use std::collections::BTreeMap;
 use std::path::Path;
+use std::sync::Arc;
 
 /// A dataset in memory.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Dataset {
     /// The task.
     pub task: Task,
+    /// What its rows hold.
+    pub layout: Arc<Layout>,
     /// Control rate \[Hz\].
     pub fps: u32,
     /// The demos.
@@ -37,6 +41,8 @@ pub struct Dataset {
 pub struct Description {
     /// The task.
     pub task: Task,
+    /// What its rows hold.
+    pub layout: Arc<Layout>,
     /// Control rate \[Hz\].
     pub fps: u32,
     /// Where the dataset came from.
@@ -53,13 +59,13 @@ pub struct Description {
 /// something cannot be read at all.
 pub fn read(root: &Path) -> Result<Dataset> {
     let (mut demos, mut rewards, mut successes, mut source_episodes) = (vec![], vec![], vec![], vec![]);
-    let Description { task, fps, provenance, files } = each(root, |episode| {
+    let Description { task, layout, fps, provenance, files } = each(root, |episode| {
         demos.push(episode.demo);
         rewards.push(episode.rewards);
         successes.push(episode.success);
         source_episodes.push(episode.source_index);
     })?;
-    Ok(Dataset { task, fps, demos, rewards, successes, source_episodes, provenance, files })
+    Ok(Dataset { task, layout, fps, demos, rewards, successes, source_episodes, provenance, files })
 }
 
 /// As [`read`], in the memory of one file: shows every episode to `see`, in order. What was shown counts only when all could be read.
@@ -68,7 +74,7 @@ pub fn read(root: &Path) -> Result<Dataset> {
 /// As [`read`].
 pub fn each(root: &Path, see: impl FnMut(DatasetEpisode)) -> Result<Description> {
     let info = check::info(root)?;
-    let mut rows = Rows::new(info.task, see);
+    let mut rows = Rows::new(&info.layout, see);
     let mut rewritten = None;
     let mut files = BTreeMap::from([(INFO.to_string(), info.hash)]);
     for name in info.files.keys() {
@@ -100,7 +106,9 @@ pub fn each(root: &Path, see: impl FnMut(DatasetEpisode)) -> Result<Description>
     match (rows.finish(root, &info), rewritten) {
         (Err(why), rewritten) => Err(also_rewritten(why, rewritten.as_deref())),
         (Ok(()), Some(path)) => Err(Error::input(&path, "was rewritten by another program; run hilt convert again")),
-        (Ok(()), None) => Ok(Description { task: info.task, fps: info.fps, provenance: info.provenance, files }),
+        (Ok(()), None) => {
+            Ok(Description { task: info.task, layout: info.layout, fps: info.fps, provenance: info.provenance, files })
+        }
     }
 }
 
@@ -122,8 +130,8 @@ fn also_rewritten(error: Error, rewritten: Option<&Path>) -> Error {
 pub fn read_for(root: &Path, task: Task) -> Result<Dataset> {
     let dataset = read(root)?;
     if dataset.task != task {
-        let (found, dim, wanted) = (dataset.task, dataset.task.state_dim(), task.state_dim());
-        let message = format!("is a dataset of {found} (states of {dim} numbers), not of {task} ({wanted})");
+        let (found, dim) = (dataset.task, dataset.layout.state_dim());
+        let message = format!("is a dataset of {found} (states of {dim} numbers), not of {task}");
         return Err(Error::input(root, message));
     }
     Ok(dataset)

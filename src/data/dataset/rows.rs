@@ -9,17 +9,17 @@ use super::features::{
 use crate::data::parquet_file;
 use crate::demo::Demo;
 use crate::error::{Error, Result};
-use crate::state::JOINTS;
-use crate::task::Task;
+use crate::layout::Layout;
 use arrow_array::cast::AsArray;
 use arrow_array::types::{Float32Type, Int64Type};
 use arrow_array::{Array, RecordBatch};
 use arrow_buffer::BooleanBuffer;
 use std::path::Path;
+use std::sync::Arc;
 
 /// The rows that were read, and the episode that they are in.
 pub(super) struct Rows<F> {
-    task: Task,
+    layout: Arc<Layout>,
     features: Vec<Feature>,
     /// What every episode is shown to.
     see: F,
@@ -62,10 +62,10 @@ struct Batch<'a> {
 }
 
 impl<F: FnMut(DatasetEpisode)> Rows<F> {
-    /// No rows of a dataset of `task`.
-    pub(super) fn new(task: Task, see: F) -> Self {
-        let (features, now) = (features(task), Episode::default());
-        Rows { task, features, see, frames: 0, episodes: 0, now, misplaced: None, wrong: None }
+    /// No rows of a dataset of this layout.
+    pub(super) fn new(layout: &Arc<Layout>, see: F) -> Self {
+        let (features, now, layout) = (features(layout), Episode::default(), Arc::clone(layout));
+        Rows { layout, features, see, frames: 0, episodes: 0, now, misplaced: None, wrong: None }
     }
 
     /// Adds the rows of one file.
@@ -105,7 +105,7 @@ impl<F: FnMut(DatasetEpisode)> Rows<F> {
     }
 
     fn check_column(&self, path: &Path, batch: &RecordBatch, feature: &Feature) -> Result<()> {
-        let (name, width, task) = (feature.name, feature.width, self.task);
+        let (name, width, task) = (feature.name, feature.width, &self.layout.name);
         let wrong = |what: String| Error::input(path, format!("column {name} {what}"));
         let column = batch.column_by_name(name).ok_or_else(|| wrong("is missing".into()))?;
         let expected = field(feature);
@@ -145,8 +145,9 @@ impl<F: FnMut(DatasetEpisode)> Rows<F> {
         }
         now.next.clear();
         batch.next.iter().for_each(|(values, width)| now.next.extend(&values[r * width..(r + 1) * width]));
-        now.actions.extend(&batch.actions[r * JOINTS..(r + 1) * JOINTS]);
-        now.executed.extend(&batch.executed[r * JOINTS..(r + 1) * JOINTS]);
+        let of_row = r * self.layout.action_dim()..(r + 1) * self.layout.action_dim();
+        now.actions.extend(&batch.actions[of_row.clone()]);
+        now.executed.extend(&batch.executed[of_row]);
         now.rewards.push(batch.rewards[r]);
         self.frames += 1;
         if batch.done.value(r) {
@@ -158,7 +159,7 @@ impl<F: FnMut(DatasetEpisode)> Rows<F> {
         let Episode { states, next, actions, executed, rewards, source } = &mut self.now;
         states.append(next);
         // Copies as long as the episode, where what they are copied from has room for the longest.
-        match Demo::new(&self.task.layout(), states.as_slice().into(), actions.as_slice().into(), executed.as_slice().into()) {
+        match Demo::new(&self.layout, states.as_slice().into(), actions.as_slice().into(), executed.as_slice().into()) {
             Ok(demo) => (self.see)(DatasetEpisode { source_index: *source, demo, rewards: rewards.as_slice().into(), success }),
             Err(what) => drop(self.wrong.get_or_insert_with(|| format!("episode {}: {what}", self.episodes))),
         }

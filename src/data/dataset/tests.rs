@@ -4,7 +4,7 @@ use super::sizes::Sizes;
 use super::*;
 use crate::demo::Demo;
 use crate::error::Error;
-use crate::state::JOINTS;
+use crate::robot::file::built_in::paper_robot;
 use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::fs;
@@ -12,17 +12,17 @@ use std::fs;
 const TASK: Task = Task::PickUp;
 
 fn episode(number: usize) -> DatasetEpisode {
-    let steps = 3 + number % 4;
+    let (steps, layout) = (3 + number % 4, TASK.layout(&paper_robot()));
     let numbers = |n: usize| (0..n).map(|i| (i * i) as f32 * 0.01 - number as f32).collect::<Vec<f32>>();
-    let demo =
-        Demo::new(&TASK.layout(), numbers((steps + 1) * TASK.state_dim()), numbers(steps * JOINTS), numbers(steps * JOINTS));
+    let demo = Demo::new(&layout, numbers((steps + 1) * layout.state_dim()), numbers(steps * 9), numbers(steps * 9));
     let demo = demo.expect("a demo");
     DatasetEpisode { source_index: 10 + number as u64, demo, rewards: vec![0.5; steps], success: true }
 }
 
 fn fill(dir: &Path, episodes: &Episodes, change: impl Fn(&mut Sizes)) -> Result<()> {
     let (provenance, interrupt) = (Provenance::new("convert", TASK, serde_json::json!({}), 0), Interrupt::default());
-    let mut content = Content::new(TASK, &provenance, &interrupt);
+    let robot = paper_robot();
+    let mut content = Content::new((&robot, TASK), &provenance, &interrupt);
     change(&mut content.sizes);
     content.fill(dir, episodes)
 }

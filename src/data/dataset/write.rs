@@ -11,16 +11,21 @@ use super::whole::Whole;
 use crate::data::{Provenance, parquet_file};
 use crate::error::{Error, Result};
 use crate::interrupt::Interrupt;
+use crate::layout::Layout;
+use crate::robot::Robot;
 use crate::task::Task;
 use arrow_schema::Schema;
 use parquet::errors::ParquetError;
 use rayon::prelude::*;
 use std::fs;
 use std::path::Path;
+use std::sync::Arc;
 
 /// What the datasets of one call share.
 pub(super) struct Content<'a> {
+    pub(super) robot: &'a Robot,
     pub(super) task: Task,
+    pub(super) layout: Arc<Layout>,
     pub(super) provenance: &'a Provenance,
     pub(super) interrupt: &'a Interrupt,
     pub(super) sizes: Sizes,
@@ -35,8 +40,8 @@ struct Encoded {
 
 impl<'a> Content<'a> {
     /// Cut as all datasets are.
-    pub(super) fn new(task: Task, provenance: &'a Provenance, interrupt: &'a Interrupt) -> Self {
-        Content { task, provenance, interrupt, sizes: Sizes::USUAL }
+    pub(super) fn new((robot, task): (&'a Robot, Task), provenance: &'a Provenance, interrupt: &'a Interrupt) -> Self {
+        Content { robot, task, layout: task.layout(robot), provenance, interrupt, sizes: Sizes::USUAL }
     }
 
     /// Writes one dataset into the empty directory `dir`.
@@ -45,7 +50,7 @@ impl<'a> Content<'a> {
             return Err(Error::input(dir, "a dataset needs at least one episode, none is left"));
         }
         fs::create_dir_all(dir).map_err(|e| Error::io(dir, "create", e))?;
-        let features = features(self.task);
+        let features = features(&self.layout);
         let schema = Schema::new(features.iter().map(features::field).collect::<Vec<_>>());
         let encoder = Encoder::new(schema, self.provenance).map_err(|e| parquet_file::cannot_encode(dir, e))?;
         let mut data = Series::new(dir, DATA, &encoder, self.provenance, self.sizes.file_bytes);
@@ -70,7 +75,15 @@ impl<'a> Content<'a> {
             }
         }
         let files = data.finish()?.into_iter().chain(table.finish()?);
-        meta::write(dir, self.task, &features, (number, first), &whole.finish(self.interrupt)?, self.provenance, files)
+        meta::write(
+            dir,
+            (self.robot, self.task, &self.layout),
+            &features,
+            (number, first),
+            &whole.finish(self.interrupt)?,
+            self.provenance,
+            files,
+        )
     }
 
     /// The episodes that come next: their numbers, and those of their first frames.
@@ -89,8 +102,8 @@ impl<'a> Content<'a> {
         let (number, steps) = (episode.source_index, episode.demo.len());
         let wrong = |what: String| Err(Error::input(dir, what));
         let layout = episode.demo.layout();
-        if *layout != self.task.layout() {
-            return wrong(format!("episode {number} is of {}, the dataset of {}", layout.name, self.task));
+        if *layout != self.layout {
+            return wrong(format!("episode {number} is of {}, the dataset of {}, or of another robot", layout.name, self.task));
         }
         if steps != expected {
             return wrong(format!("episode {number} has {steps} actions, {expected} were announced"));

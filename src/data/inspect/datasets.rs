@@ -4,7 +4,6 @@ use super::answer::answer;
 use super::statistics::{Columns, statistics};
 use crate::data::dataset;
 use crate::error::{Error, Result};
-use crate::state::{JOINTS, State, action_names};
 use serde_json::{Value, json};
 use std::path::Path;
 
@@ -17,8 +16,8 @@ pub(super) fn one(root: &Path) -> Result<Value> {
         successes += usize::from(episode.success);
         sources.push(episode.source_index);
         states.add(episode.demo.states(), episode.demo.layout().state_dim());
-        actions.add(episode.demo.actions(), JOINTS);
-        executed.add(episode.demo.executed(), JOINTS);
+        actions.add(episode.demo.actions(), episode.demo.layout().action_dim());
+        executed.add(episode.demo.executed(), episode.demo.layout().action_dim());
     })?;
     // The squares of the distances from the means, which are known now.
     let again = dataset::each(root, |episode| {
@@ -38,9 +37,9 @@ pub(super) fn one(root: &Path) -> Result<Value> {
         "successes": successes,
         "episode_steps": statistics(lengths.iter().copied()),
         "source_episodes": sources,
-        "states": states.describe(&State::column_names(found.task)),
-        "actions": actions.describe(&action_names()),
-        "executed_actions": executed.describe(&action_names()),
+        "states": states.describe(&dataset::names(&found.layout.state)),
+        "actions": actions.describe(&dataset::names(&found.layout.action)),
+        "executed_actions": executed.describe(&dataset::names(&found.layout.action)),
     });
     Ok(answer("dataset", &found.provenance, rest))
 }

@@ -2,11 +2,11 @@
 
 use super::answer::answer;
 use super::statistics::{by_entry, statistics};
-use crate::data::{ContentHash, Provenance, recording};
+use crate::data::{ContentHash, Provenance, dataset, recording};
 use crate::demo::{Episode, Phase, Step};
 use crate::error::{Error, Result};
 use crate::interrupt::Interrupt;
-use crate::state::{CONTROL_DT_S, State, action_names};
+use crate::state::{Action, CONTROL_DT_S};
 use crate::task::FailureClass;
 use rayon::prelude::*;
 use serde_json::{Map, Value, json};
@@ -17,10 +17,14 @@ use std::path::Path;
 pub(super) fn one(path: &Path) -> Result<Value> {
     let (episode, provenance) = recording::read(path)?;
     let states: Vec<f32> = moments(&episode).flat_map(|s| s.state.to_row()).collect();
-    let actions = |pick: fn(&Step) -> &[f64; 9]| episode.steps.iter().flat_map(|s| pick(s).map(|v| v as f32)).collect::<Vec<_>>();
+    let actions =
+        |pick: fn(&Step) -> &Action| episode.steps.iter().flat_map(|s| pick(s).iter().map(|v| *v as f32)).collect::<Vec<_>>();
+    let layout = episode.scene.task.layout(&episode.scene.robot);
+    let [state_names, action_names] = [&layout.state, &layout.action].map(|spans| dataset::names(spans));
     let task = episode.scene.task;
     let rest = json!({
         "task": task,
+        "robot": episode.scene.robot.name,
         "episode": episode.index,
         "steps": episode.steps.len(),
         "duration_s": episode.steps.len() as f64 * CONTROL_DT_S,
@@ -31,9 +35,9 @@ pub(super) fn one(path: &Path) -> Result<Value> {
         "conditions": conditions(&episode),
         "phase_steps": phases(&episode),
         "contact_steps": contacts(&episode),
-        "states": by_entry(&State::column_names(task), &states),
-        "actions": by_entry(&action_names(), &actions(|s| &s.commanded)),
-        "executed_actions": by_entry(&action_names(), &actions(|s| &s.executed)),
+        "states": by_entry(&state_names, &states),
+        "actions": by_entry(&action_names, &actions(|s| &s.commanded)),
+        "executed_actions": by_entry(&action_names, &actions(|s| &s.executed)),
     });
     Ok(answer("recording", &provenance, rest))
 }

@@ -10,8 +10,8 @@ pub(super) fn step(step: &Step, task: Task, number: usize, final_state: bool) ->
     let conditions = task.condition_names().iter().zip(&step.conditions);
     proto::Step {
         step: number as u64,
-        q_rad: step.state.q_rad.to_vec(),
-        dq_rad_s: step.state.dq_rad_s.to_vec(),
+        q_rad: step.state.q.to_vec(),
+        dq_rad_s: step.state.dq.to_vec(),
         block: Some(pose(&step.state.block)),
         context: Some(context(&step.state.context)),
         base_now: step.base_now.as_ref().map(pose),

@@ -1,17 +1,16 @@
 //! What a viewer shows: transforms, joint states and the things of the scene.
 
 use crate::demo::Step;
-use crate::robot::Arm;
-use crate::robot::jaco::{JOINT_SPECS, LINK_NAMES};
+use crate::robot::Robot;
 use crate::scene::{BLOCK_EDGE_M, Scene};
-use crate::state::{Context, JOINT_NAMES, Pose, State};
+use crate::state::{Context, Pose, State};
 use foxglove::messages::{
     self as msg, Color, CubePrimitive, FrameTransform, FrameTransforms, JointState, JointStates, Quaternion, SceneEntity,
     SceneUpdate, SpherePrimitive, Timestamp, Vector3,
 };
 use nalgebra::Isometry3;
 
-/// The fixed frame: the arm's base, z up.
+/// The fixed frame: the robot's foot, z up.
 pub const WORLD_FRAME: &str = "world";
 /// The block to move.
 pub const BLOCK_FRAME: &str = "block";
@@ -30,12 +29,13 @@ const DARK: [f64; 4] = [0.30, 0.30, 0.34, 1.0];
 const NANOSECONDS_PER_SECOND: u64 = 1_000_000_000;
 
 /// `/tf`: every link below its URDF parent (the base link below the world), the block, the base block.
-pub(super) fn frames(arm: &Arm, step: &Step, time_ns: u64) -> FrameTransforms {
-    let links = arm.link_poses(&step.state.q_rad);
-    let mut transforms = vec![transform(WORLD_FRAME, LINK_NAMES[0], &links[0], time_ns)];
-    for (joint, spec) in JOINT_SPECS.iter().enumerate() {
-        let parent_from_child = links[spec.parent].inverse() * links[joint + 1];
-        transforms.push(transform(LINK_NAMES[spec.parent], LINK_NAMES[joint + 1], &parent_from_child, time_ns));
+pub(super) fn frames(robot: &Robot, step: &Step, time_ns: u64) -> FrameTransforms {
+    let links = robot.link_poses(&step.state.q);
+    let name = |link: usize| robot.links[link].name.as_str();
+    let mut transforms = vec![transform(WORLD_FRAME, name(0), &links[0], time_ns)];
+    for (i, joint) in robot.joints.iter().enumerate() {
+        let parent_from_child = links[joint.parent].inverse() * links[i + 1];
+        transforms.push(transform(name(joint.parent), name(i + 1), &parent_from_child, time_ns));
     }
     transforms.push(transform(WORLD_FRAME, BLOCK_FRAME, &step.state.block.isometry(), time_ns));
     if let Some(base) = step.base_now {
@@ -45,15 +45,15 @@ pub(super) fn frames(arm: &Arm, step: &Step, time_ns: u64) -> FrameTransforms {
 }
 
 /// `/joint_states`.
-pub(super) fn joints(state: &State, time_ns: u64) -> JointStates {
+pub(super) fn joints(robot: &Robot, state: &State, time_ns: u64) -> JointStates {
     let joint = |i: usize| JointState {
-        name: JOINT_NAMES[i].into(),
-        position: Some(state.q_rad[i]),
-        velocity: Some(state.dq_rad_s[i]),
+        name: robot.joints[i].name.clone(),
+        position: Some(state.q[i]),
+        velocity: Some(state.dq[i]),
         acceleration: None,
         effort: None,
     };
-    JointStates { timestamp: Some(timestamp(time_ns)), joints: (0..JOINT_NAMES.len()).map(joint).collect() }
+    JointStates { timestamp: Some(timestamp(time_ns)), joints: (0..robot.joints.len()).map(joint).collect() }
 }
 
 /// `/scene`: things that keep their shape; those that move are locked to their frame.

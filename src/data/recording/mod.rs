@@ -9,7 +9,7 @@
 //! | `/hilt/step` | hilt.Step | every control step, then the final state |
 //! | `/hilt/outcome` | hilt.Outcome | success or failure class: once, at the end |
 //!
-//! The URDF is attached as `robot.urdf`; the metadata record `hilt` holds provenance and seal. Times are simulated, from 0. MCAP's own
+//! The robot is attached twice: as `robot.urdf` for viewers, as `robot.json` with all that hilt knows of it; the metadata record `hilt` holds provenance and seal. Times are simulated, from 0. MCAP's own
 //! checksums hold as well: the one of the data section is computed last and covers the seal, which takes its place for zeros.
 
 mod decode;
@@ -28,7 +28,7 @@ use crate::demo::Episode;
 use crate::error::{Error, Result};
 use crate::guard::guarded;
 use crate::interrupt;
-use crate::robot::Arm;
+use crate::robot::urdf;
 use crate::state::CONTROL_HZ;
 use ::foxglove::Encode;
 use ::foxglove::messages::{FrameTransforms, JointStates, SceneUpdate};
@@ -42,12 +42,11 @@ use std::collections::BTreeMap;
 use std::io::Cursor;
 use std::path::{Path, PathBuf};
 use topics::{OUTCOME_TOPIC, SCENE_TOPIC, STEP_TOPIC};
+pub use topics::{ROBOT_NAME, URDF_NAME};
 use walk::Outline;
 
 /// Duration of a control step on the clock of the file \[ns\].
 const STEP_NS: u64 = 1_000_000_000 / CONTROL_HZ as u64;
-/// Name of the attached robot description.
-pub const URDF_NAME: &str = "robot.urdf";
 /// Key of the provenance in the metadata record.
 const PROVENANCE: &str = "provenance";
 /// Key of the seal in the metadata record.
@@ -87,22 +86,21 @@ pub fn files(dir: &Path) -> Result<Vec<PathBuf>> {
 ///
 /// # Errors
 /// As [`encode`]; [`Error::Io`] when the system refuses.
-pub fn write(path: &Path, episode: &Episode, urdf: &str, provenance: &Provenance) -> Result<()> {
-    atomic::write_bytes(path, &encode(path, episode, urdf, provenance)?)
+pub fn write(path: &Path, episode: &Episode, provenance: &Provenance) -> Result<()> {
+    atomic::write_bytes(path, &encode(path, episode, provenance)?)
 }
 
-/// The bytes of the file that [`write()`] writes to `path`. `urdf` is the robot's description; link names are those of
-/// [`crate::robot::jaco::LINK_NAMES`].
+/// The bytes of the file that [`write()`] writes to `path`.
 ///
 /// # Errors
 /// [`Error::Input`] when a step's conditions do not fit the task.
-pub fn encode(path: &Path, episode: &Episode, urdf: &str, provenance: &Provenance) -> Result<Vec<u8>> {
+pub fn encode(path: &Path, episode: &Episode, provenance: &Provenance) -> Result<Vec<u8>> {
     let expected = episode.scene.task.condition_names().len();
     if let Some(step) = episode.steps.iter().chain([&episode.last]).find(|s| s.conditions.len() != expected) {
         let message = format!("a step has {} conditions, {} has {expected}", step.conditions.len(), episode.scene.task);
         return Err(Error::input(path, message));
     }
-    let bytes = to_mcap(episode, urdf, provenance).map_err(|e| Error::input(path, format!("cannot be encoded as MCAP: {e}")))?;
+    let bytes = to_mcap(episode, provenance).map_err(|e| Error::input(path, format!("cannot be encoded as MCAP: {e}")))?;
     Ok(close(bytes))
 }
 
@@ -203,7 +201,7 @@ pub fn decode(path: &Path, bytes: &[u8]) -> Result<(Episode, Provenance)> {
     decoded.unwrap_or_else(|why| Err(damaged(why)))
 }
 
-fn to_mcap(episode: &Episode, urdf: &str, provenance: &Provenance) -> McapResult<Vec<u8>> {
+fn to_mcap(episode: &Episode, provenance: &Provenance) -> McapResult<Vec<u8>> {
     // The checksum of the whole data section covers the seal: `close` fills in both.
     let options = WriteOptions::new()
         .compression(Some(mcap::Compression::Zstd))
@@ -212,13 +210,13 @@ fn to_mcap(episode: &Episode, urdf: &str, provenance: &Provenance) -> McapResult
         .library(concat!("hilt ", env!("CARGO_PKG_VERSION")));
     let mut writer = options.create(Cursor::new(Vec::new()))?;
     write_messages(&mut writer, episode)?;
-    writer.attach(&Attachment {
-        log_time: 0,
-        create_time: 0,
-        name: URDF_NAME.into(),
-        media_type: "application/xml".into(),
-        data: Cow::Borrowed(urdf.as_bytes()),
-    })?;
+    let robot = &*episode.scene.robot;
+    let json = serde_json::to_vec(robot).expect("a robot is plain data with text keys");
+    let attachments = [(URDF_NAME, "application/xml", urdf(robot).into_bytes()), (ROBOT_NAME, "application/json", json)];
+    for (name, media_type, data) in attachments {
+        let data = Cow::Owned(data);
+        writer.attach(&Attachment { log_time: 0, create_time: 0, name: name.into(), media_type: media_type.into(), data })?;
+    }
     let entries = [(PROVENANCE.to_string(), provenance.to_json()), (SEAL.to_string(), seal::blank())];
     writer.write_metadata(&Metadata { name: provenance::KEY.into(), metadata: BTreeMap::from(entries) })?;
     writer.finish()?;
@@ -232,14 +230,14 @@ fn write_messages(writer: &mut Writer<Cursor<Vec<u8>>>, episode: &Episode) -> Mc
     let mut scene = channel(writer, SCENE_TOPIC, "hilt.Scene", "protobuf", proto::DESCRIPTORS)?;
     let mut steps = channel(writer, STEP_TOPIC, "hilt.Step", "protobuf", proto::DESCRIPTORS)?;
     let mut outcome = channel(writer, OUTCOME_TOPIC, "hilt.Outcome", "protobuf", proto::DESCRIPTORS)?;
-    let arm = Arm::new();
+    let robot = &*episode.scene.robot;
     scene.write(writer, 0, &encode::scene(&episode.scene))?;
     drawing.write(writer, 0, &foxglove::drawing(&episode.scene))?;
     let end = episode.steps.len();
     for (t, step) in episode.steps.iter().chain([&episode.last]).enumerate() {
         let time = t as u64 * STEP_NS;
-        frames.write(writer, time, &foxglove::frames(&arm, step, time))?;
-        joints.write(writer, time, &foxglove::joints(&step.state, time))?;
+        frames.write(writer, time, &foxglove::frames(robot, step, time))?;
+        joints.write(writer, time, &foxglove::joints(robot, &step.state, time))?;
         steps.write(writer, time, &encode::step(step, episode.scene.task, t, t == end))?;
     }
     outcome.write(writer, end as u64 * STEP_NS, &encode::outcome(episode))

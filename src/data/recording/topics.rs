@@ -1,4 +1,4 @@
-//! Topics of our own messages.
+//! Topics of our own messages, and names of what is attached.
 
 /// What stood where at the start.
 pub const SCENE_TOPIC: &str = "/hilt/scene";
@@ -6,3 +6,7 @@ pub const SCENE_TOPIC: &str = "/hilt/scene";
 pub const STEP_TOPIC: &str = "/hilt/step";
 /// Success or failure class.
 pub const OUTCOME_TOPIC: &str = "/hilt/outcome";
+/// Name of the attached robot description for viewers.
+pub const URDF_NAME: &str = "robot.urdf";
+/// Name of the attached robot, all that hilt knows of it.
+pub const ROBOT_NAME: &str = "robot.json";

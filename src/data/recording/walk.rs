@@ -20,6 +20,8 @@ pub(super) struct Outline<'a> {
     from: usize,
     /// Entries of the metadata records by their names.
     pub(super) metadata: BTreeMap<&'a str, BTreeMap<&'a str, &'a str>>,
+    /// Attachments by their names.
+    pub(super) attachments: BTreeMap<&'a str, &'a [u8]>,
     /// Messages by the summary.
     messages: u64,
 }
@@ -37,7 +39,7 @@ impl<'a> Outline<'a> {
     pub(super) fn of(bytes: &'a [u8], sections: &Sections) -> Result<Self, String> {
         let from = mcap::MAGIC.len();
         let data = &bytes[from..sections.data_end];
-        let (mut metadata, mut found) = (BTreeMap::new(), Places::new());
+        let (mut metadata, mut attachments, mut found) = (BTreeMap::new(), BTreeMap::new(), Places::new());
         for (number, record) in Records::new(data, from).enumerate() {
             let record = record?;
             if (number == 0) != (record.op == op::HEADER) {
@@ -51,7 +53,10 @@ impl<'a> Outline<'a> {
                     let (name, entries) = metadata_entries(Fields(record.content))?;
                     metadata.insert(name, entries);
                 }
-                op::ATTACHMENT => check_attachment(record.content)?,
+                op::ATTACHMENT => {
+                    let (name, content) = attachment(record.content)?;
+                    attachments.insert(name, content);
+                }
                 _ => {}
             }
         }
@@ -59,7 +64,7 @@ impl<'a> Outline<'a> {
         if indexed != found {
             return Err("its summary does not say where its chunks, attachments and metadata are".into());
         }
-        Ok(Outline { data, from, metadata, messages })
+        Ok(Outline { data, from, metadata, attachments, messages })
     }
 
     /// Shows every message to `see`, with its topic.
@@ -170,16 +175,17 @@ fn metadata_entries<'a>(mut fields: Fields<'a>) -> Result<(&'a str, BTreeMap<&'a
     Ok((name, found))
 }
 
-fn check_attachment(content: &[u8]) -> Result<(), String> {
+/// Name and content.
+fn attachment(content: &[u8]) -> Result<(&str, &[u8]), String> {
     let mut fields = Fields(content);
-    let (_logged, _created, name, _media, _data) =
+    let (_logged, _created, name, _media, data) =
         (fields.u64()?, fields.u64()?, fields.text()?, fields.text()?, fields.bytes64()?);
     let covered = &content[..content.len() - fields.0.len()];
     let crc = fields.u32()?;
     if crc != 0 && crc != crc32fast::hash(covered) {
         return Err(format!("the attachment {name} does not match its own checksum"));
     }
-    Ok(())
+    Ok((name, data))
 }
 
 /// Where the summary says that records are, and how many messages it counts.

@@ -8,7 +8,7 @@ use crate::learn::models::{Corpus, Policy, PolicySamples};
 use crate::learn::run::EpochMetrics;
 use rand::Rng;
 
-/// Labelled finger velocity above which the hand closes or holds, and below whose negative it opens \[rad/s\].
+/// Labelled finger velocity above which the hand closes or holds, and below whose negative it opens \[rad/s, and what counts as one\].
 const FINGER_COMMAND_RAD_S: f32 = 0.2;
 
 /// Root mean square error of the mean action on the validation demos \[rad/s\].
@@ -72,7 +72,8 @@ fn action_errors(
     let others = || (0..dim).filter(|i| !fingers.contains(i));
     let mut sums = [[0.0f64; 3]; 3]; // arm, fingers, rows
     for (r, mean) in mean.chunks_exact(dim).enumerate() {
-        let closing = fingers.clone().map(|i| offset[i] + unit[i] * label(r, i)).sum::<f32>() / fingers.len().max(1) as f32;
+        let closing = fingers.clone().map(|i| (offset[i] + unit[i] * label(r, i)) / layout.closing_unit(i)).sum::<f32>()
+            / fingers.len().max(1) as f32;
         let class = 1 + usize::from(closing > FINGER_COMMAND_RAD_S) - usize::from(closing < -FINGER_COMMAND_RAD_S);
         let square = |i: usize| f64::from(unit[i] * (mean[i] - label(r, i))).powi(2);
         sums[class][0] += others().map(square).sum::<f64>();

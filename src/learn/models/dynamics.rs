@@ -67,15 +67,25 @@ impl Dynamics {
             structure: settings.structure,
             known: known(layout, settings.structure),
             features,
-            action: Scaling::fit(corpus.rows(), action_dim, ACTION_FLOOR_RAD_S, |r, row| row.copy_from_slice(corpus.executed(r))),
+            action: Scaling::fit(
+                corpus.rows(),
+                action_dim,
+                |i| ACTION_FLOOR_RAD_S * layout.action_unit(i),
+                |r, row| row.copy_from_slice(corpus.executed(r)),
+            ),
             residual: Scaling { mean: vec![0.0; changing], std: vec![1.0; changing] },
             net: Mlp::new(&widths, settings.activation, rng),
             settings: settings.clone(),
         };
-        dynamics.residual = Scaling::fit(corpus.rows(), changing, STEP_FLOOR, |r, row| {
-            let (state, action, next) = (corpus.state(r), corpus.executed(r), corpus.next(r));
-            row.iter_mut().enumerate().for_each(|(i, v)| *v = next[i] - dynamics.known_next(i, state[i], |k| action[k]));
-        });
+        dynamics.residual = Scaling::fit(
+            corpus.rows(),
+            changing,
+            |i| STEP_FLOOR * layout.state_unit(i),
+            |r, row| {
+                let (state, action, next) = (corpus.state(r), corpus.executed(r), corpus.next(r));
+                row.iter_mut().enumerate().for_each(|(i, v)| *v = next[i] - dynamics.known_next(i, state[i], |k| action[k]));
+            },
+        );
         dynamics
     }
 

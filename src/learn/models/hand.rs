@@ -143,8 +143,7 @@ mod tests {
     use super::*;
     use crate::math;
     use crate::nn::LANES;
-    use crate::robot::{self, READY_Q_RAD};
-    use crate::state::ARM_JOINTS;
+    use crate::robot::file::built_in::paper_robot;
     use crate::tasks::Task;
 
     #[test]
@@ -162,19 +161,20 @@ mod tests {
     #[test]
     fn the_hand_is_where_the_arms_own_kinematics_have_it() {
         // lane 5 holds the angles in question, the others something else
-        let q = READY_Q_RAD.map(|v| v + 0.3);
-        let arm = Arm::new(Task::Stack.layout().arm.as_ref().expect("the arm is known"));
-        let hand = arm.hand(&q.map(|v| Lanes(std::array::from_fn(|l| v as f32 + 0.1 * (l as f32 - 5.0)))));
-        let (tool, jacobian) = robot::kinematics::Arm::new().tool_jacobian(&q);
+        let q = paper_robot().ready.map(|v| v + 0.3);
+        let arm = Arm::new(Task::Stack.layout(&paper_robot()).arm.as_ref().expect("the arm is known"));
+        let lanes = |v: &f64| Lanes(std::array::from_fn(|l| *v as f32 + 0.1 * (l as f32 - 5.0)));
+        let hand = arm.hand(&q.iter().map(lanes).collect::<Vec<_>>());
+        let (tool, jacobian) = paper_robot().tool_jacobian(&q);
         let matrix = tool.rotation.to_rotation_matrix();
         for r in 0..3 {
             assert!((f64::from(hand.tool[r].0[5]) - tool.translation.vector[r]).abs() < 1e-6);
             (0..3).for_each(|c| assert!((f64::from(hand.columns[c][r].0[5]) - matrix[(r, c)]).abs() < 1e-6));
-            let (mut along, mut about) = ([Lanes::default(); ARM_JOINTS], [Lanes::default(); ARM_JOINTS]);
+            let (mut along, mut about) = ([Lanes::default(); 6], [Lanes::default(); 6]);
             let unit = std::array::from_fn(|k| Lanes::splat(if k == r { 1.0 } else { 0.0 }));
             hand.add_joint_gradient(unit, Vec3::default(), &mut along);
             hand.add_joint_gradient(Vec3::default(), unit, &mut about);
-            for i in 0..ARM_JOINTS {
+            for i in 0..6 {
                 assert!((f64::from(along[i].0[5]) - jacobian[(r, i)]).abs() < 1e-5);
                 assert!((f64::from(about[i].0[5]) - jacobian[(r + 3, i)]).abs() < 1e-5);
             }

@@ -39,7 +39,12 @@ impl Policy {
     pub(in crate::learn) fn new(corpus: &Corpus, settings: &TrainSettings, rng: &mut impl Rng) -> Self {
         let features = Features::fit(corpus, settings.features, settings.mask_dq);
         let dim = corpus.layout.action_dim();
-        let action = Scaling::fit(corpus.rows(), dim, ACTION_FLOOR_RAD_S, |r, row| row.copy_from_slice(corpus.commanded(r)));
+        let action = Scaling::fit(
+            corpus.rows(),
+            dim,
+            |i| ACTION_FLOOR_RAD_S * corpus.layout.action_unit(i),
+            |r, row| row.copy_from_slice(corpus.commanded(r)),
+        );
         let mut lengths: Vec<usize> = (0..corpus.demos()).map(|i| corpus.demo(i).len()).collect();
         lengths.sort_unstable();
         let p95 = lengths[(lengths.len() * 95).div_ceil(100) - 1];

@@ -10,9 +10,9 @@ pub struct Scaling {
 }
 
 impl Scaling {
-    /// Statistics of so many `rows` of `width` numbers, each of which `write` writes twice. A smaller spread than `floor` counts as noise
-    /// and is not blown up.
-    pub fn fit(rows: usize, width: usize, floor: f32, mut write: impl FnMut(usize, &mut [f32])) -> Self {
+    /// Statistics of so many `rows` of `width` numbers, each of which `write` writes twice. A smaller spread of an entry than `floor` has for it
+    /// counts as noise and is not blown up.
+    pub fn fit(rows: usize, width: usize, floor: impl Fn(usize) -> f32, mut write: impl FnMut(usize, &mut [f32])) -> Self {
         let (n, mut row) = (rows.max(1) as f64, vec![0.0; width]);
         let mut mean = vec![0.0f64; width];
         for r in 0..rows {
@@ -27,7 +27,7 @@ impl Scaling {
         }
         Scaling {
             mean: mean.iter().map(|m| *m as f32).collect(),
-            std: variance.iter().map(|v| (v.sqrt() as f32).max(floor)).collect(),
+            std: variance.iter().enumerate().map(|(i, v)| (v.sqrt() as f32).max(floor(i))).collect(),
         }
     }
 
@@ -55,7 +55,7 @@ mod tests {
 
     #[test]
     fn statistics_and_the_floor() {
-        let scaling = Scaling::fit(2, 2, 0.1, |r, row| row.copy_from_slice(&[[1.0, 5.0], [3.0, 5.0]][r]));
+        let scaling = Scaling::fit(2, 2, |_| 0.1, |r, row| row.copy_from_slice(&[[1.0, 5.0], [3.0, 5.0]][r]));
         assert_eq!(scaling.mean, [2.0, 5.0]);
         assert_eq!(scaling.std, [1.0, 0.1]);
         assert_eq!(scaling.undo(0, scaling.apply(0, 7.0)), 7.0);

@@ -71,6 +71,7 @@ impl Toy {
             state,
             action,
             action_limits: vec![0.8; JOINTS],
+            action_units: Vec::new(),
             aims,
             arm: Some(arm()),
         };

@@ -1,7 +1,6 @@
 //! The colours of everything, and the fixed palette of animated pictures.
 
 use super::raster::Rgb;
-use crate::robot::jaco::LINKS;
 
 /// Behind everything.
 pub const BACKGROUND: Rgb = [246, 247, 249];
@@ -23,10 +22,7 @@ pub const GOOD: Rgb = [20, 128, 62];
 pub const BAD: Rgb = [196, 44, 44];
 /// The arm, from base to fingers: neighbours differ so that joints can be told apart.
 const ARM: [Rgb; 4] = [[82, 90, 108], [150, 160, 176], [108, 118, 136], [86, 96, 118]];
-/// Colour of each link.
-pub const LINK_COLORS: [Rgb; LINKS] = [ARM[0], ARM[1], ARM[2], ARM[1], ARM[2], ARM[1], ARM[3], ARM[2], ARM[2], ARM[2]];
-
-/// Colour of a link of any robot, whose arm has so many joints.
+/// Colour of a link of a robot, whose arm has so many joints.
 pub fn of_link(link: usize, arm: usize) -> Rgb {
     match link {
         0 => ARM[0],

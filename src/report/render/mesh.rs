@@ -1,7 +1,7 @@
 //! Closed triangle meshes of the primitives, tessellated once in their own frame.
 
 use crate::math::sin_cos;
-use crate::robot::{Shape, model};
+use crate::robot::model::Shape;
 use nalgebra::{Isometry3, Rotation3, Vector3};
 use std::f64::consts::{FRAC_PI_2, TAU};
 
@@ -29,19 +29,11 @@ pub struct Mesh {
 }
 
 impl Mesh {
-    /// The surface of a collision primitive.
-    pub fn of_shape(shape: &Shape) -> Self {
+    /// The surface of a collision primitive, and where it is in its link's frame.
+    pub fn of_shape(shape: &Shape) -> (Self, Isometry3<f64>) {
         match *shape {
-            Shape::Box { center_m, half_m } => Mesh::cuboid(center_m, half_m),
-            Shape::Capsule { from_m, to_m, radius_m } => Mesh::capsule(from_m.into(), to_m.into(), radius_m),
-        }
-    }
-
-    /// The same of a robot that was read, and where it is in its link's frame.
-    pub fn of_link_shape(shape: &model::Shape) -> (Self, Isometry3<f64>) {
-        match *shape {
-            model::Shape::Box { pose, half_m } => (Mesh::cuboid([0.0; 3], half_m), pose),
-            model::Shape::Capsule { from_m, to_m, radius_m } => {
+            Shape::Box { pose, half_m } => (Mesh::cuboid([0.0; 3], half_m), pose),
+            Shape::Capsule { from_m, to_m, radius_m } => {
                 (Mesh::capsule(from_m.into(), to_m.into(), radius_m), Isometry3::identity())
             }
         }

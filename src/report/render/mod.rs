@@ -4,6 +4,7 @@ mod camera;
 mod colors;
 mod font;
 mod gif;
+mod links;
 mod mesh;
 mod raster;
 mod robot;
@@ -16,13 +17,14 @@ pub use sheet::write_png_sheet;
 
 use crate::demo::{Episode, Step};
 use crate::error::{Error, Result};
-use crate::robot::{Arm, LINK_SHAPES};
+use crate::robot::Robot;
 use crate::scene::{BLOCK_EDGE_M, Scene};
-use crate::state::{Context, JOINTS, Pose};
+use crate::state::{Context, Pose};
 use camera::Camera;
 use mesh::Mesh;
 use nalgebra::{Isometry3, Translation3};
 use raster::{Area, Paint, Rgb, Samples};
+use std::sync::Arc;
 
 /// Samples along each edge of a pixel: 2 x 2 of them make its colour.
 const SUPERSAMPLING: usize = 2;
@@ -94,8 +96,8 @@ struct Renderer {
     empty: (Samples, RgbImage),
     /// What is being drawn; shows the empty table between two pictures.
     canvas: Samples,
-    arm: Arm,
-    robot: Vec<(usize, Mesh, Rgb)>,
+    robot: Arc<Robot>,
+    links: Vec<(usize, Mesh, Isometry3<f64>, Rgb)>,
     block: Mesh,
     obstacles: Vec<Mesh>,
     marker_bars: Mesh,
@@ -117,8 +119,8 @@ impl Renderer {
             empty: (canvas.clone(), plain),
             canvas,
             samples,
-            arm: Arm::new(),
-            robot: LINK_SHAPES.iter().map(|s| (s.link, Mesh::of_shape(&s.shape), colors::LINK_COLORS[s.link])).collect(),
+            robot: Arc::clone(&scene.robot),
+            links: links::of_robot(&scene.robot),
             block: Mesh::cuboid([0.0; 3], [half; 3]),
             obstacles: scene.obstacles.iter().map(|o| Mesh::cuboid(o.center_m, o.size_m.map(|v| v / 2.0))).collect(),
             marker_bars: Mesh::frame(target, around, MARKER_HALF_BAR_M),
@@ -132,7 +134,7 @@ impl Renderer {
             Context::None | Context::Goal(_) => None,
         });
         let mut canvas = std::mem::replace(&mut self.canvas, Samples::new(0, 0, colors::BACKGROUND));
-        let solids = self.solids(&step.state.q_rad, &step.state.block, base.as_ref());
+        let solids = self.solids(&step.state.q, &step.state.block, base.as_ref());
         draw_solids(&mut canvas, [&self.samples, &self.pixels], self.size, &solids);
         let marker = |opacity| Paint { rgb: colors::TARGET, opacity, tag: 0 };
         canvas.draw(&self.samples, &self.marker_bars, &Isometry3::identity(), marker(1.0));
@@ -145,9 +147,9 @@ impl Renderer {
     }
 
     /// Everything that casts a shadow: mesh, where it is, colour.
-    fn solids(&self, q_rad: &[f64; JOINTS], block: &Pose, base: Option<&Pose>) -> Vec<(&Mesh, Isometry3<f64>, Rgb)> {
-        let poses = self.arm.link_poses(q_rad);
-        let mut solids: Vec<_> = self.robot.iter().map(|(link, mesh, rgb)| (mesh, poses[*link], *rgb)).collect();
+    fn solids(&self, q: &[f64], block: &Pose, base: Option<&Pose>) -> Vec<(&Mesh, Isometry3<f64>, Rgb)> {
+        let poses = self.robot.link_poses(q);
+        let mut solids: Vec<_> = self.links.iter().map(|(link, mesh, local, rgb)| (mesh, poses[*link] * local, *rgb)).collect();
         solids.push((&self.block, block.isometry(), colors::BLOCK));
         solids.extend(base.map(|b| (&self.block, b.isometry(), colors::BASE)));
         solids.extend(self.obstacles.iter().map(|mesh| (mesh, Isometry3::identity(), colors::OBSTACLE)));
@@ -206,20 +208,28 @@ fn table(camera: &Camera, width: usize, height: usize) -> Samples {
 mod tests {
     use super::*;
     use crate::demo::Contacts;
-    use crate::robot::READY_Q_RAD;
+    use crate::robot::file::built_in::paper_robot;
     use crate::state::State;
     use crate::task::Task;
     use nalgebra::Vector3;
 
     fn still(block: Pose, base: Pose) -> (Scene, Step) {
         let context = Context::Base(base);
-        let scene = Scene { task: Task::Stack, block, context, obstacles: Vec::new(), friction: 1.0, block_mass_kg: 0.1 };
+        let scene = Scene {
+            robot: paper_robot(),
+            task: Task::Stack,
+            block,
+            context,
+            obstacles: Vec::new(),
+            friction: 1.0,
+            block_mass_kg: 0.1,
+        };
         let step = Step {
-            state: State { q_rad: READY_Q_RAD, dq_rad_s: [0.0; JOINTS], block, context },
+            state: State { q: paper_robot().ready, dq: [0.0; 9].into(), block, context },
             base_now: None,
-            commanded: [0.0; JOINTS],
-            executed: [0.0; JOINTS],
-            contacts: Contacts::default(),
+            commanded: [0.0; 9].into(),
+            executed: [0.0; 9].into(),
+            contacts: Contacts::none(3),
             block_speed_m_s: 0.0,
             reward: 0.0,
             conditions: Vec::new(),
@@ -250,7 +260,7 @@ mod tests {
     fn a_picture_does_not_depend_on_the_one_before() {
         let (scene, step) = still(Pose::from_yaw([0.5, 0.0, 0.025], 0.0), Pose::from_yaw([0.45, 0.27, 0.025], 0.0));
         let mut other = step.clone();
-        other.state.q_rad = READY_Q_RAD.map(|v| v + 0.3);
+        other.state.q = paper_robot().ready.map(|v| v + 0.3);
         let mut renderer = Renderer::new(&scene, (160, 120));
         let first = renderer.draw(&step);
         assert_ne!(renderer.draw(&other), first);
@@ -262,7 +272,7 @@ mod tests {
         let (scene, mut step) = still(Pose::from_yaw([0.5, 0.0, 0.025], 0.0), Pose::from_yaw([0.45, 0.27, 0.025], 0.0));
         for wrong in [f64::NAN, f64::INFINITY, 1e30, -1e30] {
             step.state.block.position_m = [wrong; 3];
-            step.state.q_rad = [wrong; JOINTS];
+            step.state.q = [wrong; 9].into();
             let (width, height) = (64, 48);
             assert_eq!(Renderer::new(&scene, (width, height)).draw(&step).data.len(), (width * height * 3) as usize);
         }

@@ -1,12 +1,11 @@
 //! A robot on its own: in its ready pose, with the hand open and closed.
 
 use super::camera::Camera;
-use super::mesh::Mesh;
-use super::raster::{Area, Rgb, Samples};
+use super::links;
+use super::raster::{Area, Samples};
 use super::{RgbImage, SUPERSAMPLING, check_size, colors, draw_solids, font, resolve, table};
 use crate::error::{Error, Result};
 use crate::robot::Robot;
-use nalgebra::Isometry3;
 
 /// Writes a PNG with two pictures of `size` pixels side by side: the open and the closed hand.
 ///
@@ -14,7 +13,7 @@ use nalgebra::Isometry3;
 /// [`Error::Usage`] for an impossible size.
 pub fn robot_png(robot: &Robot, size: (u32, u32), out: &mut Vec<u8>) -> Result<()> {
     check_size("a picture", size)?;
-    let mut closed = robot.ready.clone();
+    let mut closed = robot.ready;
     closed[robot.arm..].copy_from_slice(&robot.closed);
     let (width, height) = size;
     let mut both = RgbImage { width: 2 * width, height, data: vec![0; (2 * width * height * 3) as usize] };
@@ -31,19 +30,8 @@ fn picture(robot: &Robot, q: &[f64], size: (u32, u32)) -> RgbImage {
     let (samples, pixels) = (Camera::new(width * SUPERSAMPLING, height * SUPERSAMPLING), Camera::new(width, height));
     let mut canvas: Samples = table(&samples, width * SUPERSAMPLING, height * SUPERSAMPLING);
     let poses = robot.link_poses(q);
-    let meshes: Vec<(Mesh, Isometry3<f64>, Rgb)> = robot
-        .links
-        .iter()
-        .enumerate()
-        .flat_map(|(link, l)| {
-            let (pose, rgb) = (poses[link], colors::of_link(link, robot.arm));
-            l.shapes.iter().map(move |shape| {
-                let (mesh, local) = Mesh::of_link_shape(shape);
-                (mesh, pose * local, rgb)
-            })
-        })
-        .collect();
-    let solids: Vec<_> = meshes.iter().map(|(mesh, pose, rgb)| (mesh, *pose, *rgb)).collect();
+    let meshes = links::of_robot(robot);
+    let solids: Vec<_> = meshes.iter().map(|(link, mesh, local, rgb)| (mesh, poses[*link] * local, *rgb)).collect();
     draw_solids(&mut canvas, [&samples, &pixels], size, &solids);
     let mut picture = RgbImage { width: size.0, height: size.1, data: vec![0; width * height * 3] };
     resolve(&canvas, Area::all(width, height), &mut picture);

@@ -4,6 +4,8 @@ use super::body::{ALIGNED_RAD, Body, FindMesh};
 use super::description::{Description, JointOverride, MotorEntry, Read};
 use super::tree::{check_names, foot};
 use super::xml::{JointElement, LinkElement, Urdf, isometry};
+use crate::joints::Joints;
+use crate::robot::hand::opposing;
 use crate::robot::model::{Joint, JointKind, Motor, Posture, Robot};
 use crate::words::shown;
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
@@ -210,8 +212,8 @@ impl<'a> Assembly<'a> {
             links.push(bodies[at + 1].link(false)?);
         }
         let hand = &description.hand;
-        let ready: Vec<f64> = description.ready.iter().chain(&hand.opened).copied().collect();
-        for (key, positions) in [("ready or hand.opened", ready.as_slice()), ("hand.closed", hand.closed.as_slice())] {
+        let ready: Joints = description.ready.iter().chain(&hand.opened).copied().collect();
+        for (key, positions) in [("ready or hand.opened", &ready[..]), ("hand.closed", &hand.closed[..])] {
             let from = made.len() - positions.len();
             for (joint, position) in made[from..].iter().zip(positions) {
                 let [low, high] = joint.limits;
@@ -223,11 +225,16 @@ impl<'a> Assembly<'a> {
                 }
             }
         }
+        if let Some([near, far]) = description.reach_m
+            && !(0.0 <= near && near < far)
+        {
+            return Err(format!("reach_m is [{near}, {far}]: allowed: near and far from the foot, 0 or more, the nearer first"));
+        }
         let posture = description.posture.iter().map(|(name, position)| Posture {
             joint: description.arm.iter().position(|joint| joint == name).expect("checked"),
             position: *position,
         });
-        let robot = Robot {
+        let mut robot = Robot {
             name: description.name.clone(),
             links,
             joints: made,
@@ -237,8 +244,11 @@ impl<'a> Assembly<'a> {
             ready,
             closed: hand.closed.clone(),
             finger_speed: hand.speed,
+            opposing: Vec::new(),
+            reach_m: description.reach_m,
             posture: posture.collect(),
         };
+        robot.opposing = opposing(&robot).into_iter().map(|opposing| opposing.pair).collect();
         remarks.sort();
         remarks.dedup();
         Ok(Read { robot, remarks })

@@ -5,11 +5,13 @@ use super::mesh::bounds_of_stl;
 use super::xml::{Geometry, LinkElement, isometry};
 use crate::robot::model::{Inertia, Link, Shape};
 use crate::words::shown;
-use nalgebra::{Isometry3, Matrix3, Point3, Translation3, UnitQuaternion, Vector3};
+use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, Translation3, UnitQuaternion, Vector3};
 use std::path::PathBuf;
 
 /// Ends of a capsule are recognised within this \[m\].
 const SAME_M: f64 = 1e-9;
+/// Products of inertia below this share of the moments are what rounding leaves of none.
+const ROUNDING: f64 = 1e-12;
 /// Rotations nearer to none than this are none \[rad\].
 pub const ALIGNED_RAD: f64 = 1e-12;
 
@@ -86,7 +88,8 @@ impl Body {
             let shift = (Matrix3::identity() * off.norm_squared() - off * off.transpose()) * *mass;
             moments += if one { turned } else { turned + shift };
         }
-        let diagonal = moments[(0, 1)] == 0.0 && moments[(0, 2)] == 0.0 && moments[(1, 2)] == 0.0;
+        let off = moments[(0, 1)].abs().max(moments[(0, 2)].abs()).max(moments[(1, 2)].abs());
+        let diagonal = off <= ROUNDING * moments.trace().abs();
         let (principal, axes) = if diagonal {
             (moments.diagonal(), UnitQuaternion::identity())
         } else {
@@ -95,7 +98,8 @@ impl Body {
             if axes.determinant() < 0.0 {
                 axes.column_mut(2).neg_mut();
             }
-            (eigen.eigenvalues, UnitQuaternion::from_matrix(&axes))
+            // Not `UnitQuaternion::from_matrix`, which searches for the rotation and does not find half turns.
+            (eigen.eigenvalues, UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(axes)))
         };
         let [a, b, c] = [principal.x, principal.y, principal.z];
         if !is_foot && a.min(b).min(c) <= 0.0 {

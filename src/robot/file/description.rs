@@ -24,6 +24,9 @@ pub struct Description {
     pub tool: Tool,
     /// Where every episode begins: the arm's joints \[rad\].
     pub ready: Vec<f64>,
+    /// Distances from the foot at which the level hand gets down to the table, near and far \[m\]: nothing is drawn nearer or farther.
+    #[serde(default)]
+    pub reach_m: Option<[f64; 2]>,
     /// The hand.
     pub hand: Hand,
     /// Joints of the arm that are pulled to a position where the tool's pose leaves them free \[rad\].

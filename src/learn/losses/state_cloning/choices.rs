@@ -64,14 +64,15 @@ impl Choices {
         let std = match (settings.loss, settings.sc.scale) {
             (Objective::RawSum, _) => vec![1.0; changing],
             (_, StateScale::State) => {
-                Scaling::fit(corpus.rows(), dim, STATE_FLOOR, |r, row| row.copy_from_slice(corpus.state(r))).std
+                let floor = |i| STATE_FLOOR * layout.state_unit(i);
+                Scaling::fit(corpus.rows(), dim, floor, |r, row| row.copy_from_slice(corpus.state(r))).std
             }
             (_, StateScale::Step) => {
                 let change = |r: usize, row: &mut [f32]| {
                     let entries = row.iter_mut().zip(corpus.next(r).iter().zip(corpus.state(r)));
                     entries.for_each(|(change, (next, state))| *change = next - state);
                 };
-                Scaling::fit(corpus.rows(), changing, STEP_FLOOR, change).std
+                Scaling::fit(corpus.rows(), changing, |i| STEP_FLOOR * layout.state_unit(i), change).std
             }
         };
         let velocity = |i: usize| layout.velocities().contains(&i);

@@ -57,9 +57,13 @@ impl Statistics {
     /// The features with these scalings.
     pub fn features(&self, sight: &Sight) -> Features {
         let [state, derived] = sight.widths();
+        let std = |i: usize| {
+            let floor = FLOOR * f64::from(sight.layout.state_unit(i));
+            (self.squares[i] / self.count.max(1.0)).sqrt().max(floor) as f32
+        };
         let scaling = |range: std::ops::Range<usize>| Scaling {
             mean: self.mean[range.clone()].iter().map(|m| *m as f32).collect(),
-            std: self.squares[range].iter().map(|s| (s / self.count.max(1.0)).sqrt().max(FLOOR) as f32).collect(),
+            std: range.map(std).collect(),
         };
         Features::from_scaling(&sight.layout, sight.set, sight.mask_dq, scaling(0..state), scaling(state..state + derived))
     }
@@ -139,7 +143,7 @@ mod tests {
             }
             statistics.absorb(&sums);
         }
-        let whole = Scaling::fit(rows, dim, FLOOR as f32, |r, row| row.copy_from_slice(&states[r * dim..][..dim]));
+        let whole = Scaling::fit(rows, dim, |_| FLOOR as f32, |r, row| row.copy_from_slice(&states[r * dim..][..dim]));
         let features = statistics.features(&sight);
         let close = |a: &[f32], b: &[f32]| a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-5);
         assert!(close(&features.state_scaling().mean, &whole.mean) && close(&features.state_scaling().std, &whole.std));

@@ -25,7 +25,7 @@ pub fn layout() -> Arc<Layout> {
     let span = |name: &str, holds| Span { name: name.into(), holds, entries: vec![format!("{name}.0"), format!("{name}.1")] };
     let (state, action) = (vec![span("x", Holds::Numbers)], vec![span("u", Holds::Commands)]);
     let (name, action_limits) = ("regulator".into(), vec![1.0; 2]);
-    Arc::new(Layout { name, period_s: 0.05, state, action, action_limits, aims: vec![], arm: None })
+    Arc::new(Layout { name, period_s: 0.05, state, action, action_limits, action_units: vec![], aims: vec![], arm: None })
 }
 
 impl Regulator {
