@@ -202,7 +202,7 @@ figures: $(HILT) ## the runs behind the paper's figures 6, 7 and 8
 	$(call EXPERIMENT,figure8)
 
 report: $(HILT) ## a page of the experiments that have finished runs: RUNS/report/index.html
-	$(HILT) report --runs $(RUNS)/experiments --out $(RUNS)/report --threads $(THREADS) $(call optional,episodes,EPISODES)
+	$(HILT) report --runs $(RUNS)/experiments --out $(RUNS)/report --threads $(THREADS) $(call optional,seeds,SEEDS) $(call optional,episodes,EPISODES)
 
 # --- the binary ---------------------------------------------------------------------------------------------------------------------
 

@@ -1,3 +1,4 @@
+use super::experiment::{Chosen, parse_seeds};
 use super::places::{Content, Places};
 use super::{Context, Outcome};
 use crate::data::{atomic, table_file};
@@ -19,6 +20,9 @@ pub struct Args {
     /// Directory to write: index.html, report.md, figures, tables
     #[arg(long, value_name = "DIR", default_value = "runs/report")]
     out: PathBuf,
+    /// Show these seeds only, of those that an experiment has: 0-4, 0,3
+    #[arg(long, value_name = "SEEDS", value_parser = parse_seeds)]
+    seeds: Option<Chosen>,
     /// Episodes of each evaluation, where hilt experiment was given them too
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
     episodes: Option<u64>,
@@ -83,7 +87,13 @@ fn named(args: &Args) -> Result<Vec<Finished>> {
 
 fn read(args: &Args, name: &str) -> Result<Finished> {
     let overrides = Overrides { seeds: None, episodes: args.episodes };
-    let experiment = Experiment::read(&find(name)?, &overrides)?;
+    let mut experiment = Experiment::read(&find(name)?, &overrides)?;
+    if let Some(chosen) = &args.seeds {
+        experiment.seeds.retain(|seed| chosen.0.contains(seed));
+        if experiment.seeds.is_empty() {
+            return Err(Error::Usage(format!("--seeds: {} has none of them", experiment.name)));
+        }
+    }
     let dir = args.runs.join(&experiment.name);
     let grid = Grid::expand(&experiment, &dir)?;
     leftovers::check(&dir, &grid)?;

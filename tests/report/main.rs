@@ -151,6 +151,9 @@ fn a_part_is_shown_as_a_part_and_nothing_is_refused() {
     check(&place.at("page"));
     let html = fs::read_to_string(place.at("page/index.html")).expect("a page");
     assert!(html.contains("3 of 6 runs are there") && html.contains("seeds 12"), "{html}");
+    let said = place.done(&["report", "tiny.toml", "--seeds", "11,99", "--out", "page"]);
+    assert!(said.contains("3 of 3 runs"), "{said}");
+    place.refused(&["report", "tiny.toml", "--seeds", "99", "--out", "page"], 2, "tiny has none of them");
     // What is not a report's is not lost, nor is an older report when the next one cannot be made.
     fs::write(place.at("page/thesis.tex"), "years of work").expect("written");
     place.refused(&["report", "tiny.toml", "--out", "page"], 1, "thesis.tex");

@@ -62,6 +62,7 @@ pub enum Program {
 #[derive(Clone, Debug)]
 pub struct Chosen(pub Vec<u64>);
 
-fn parse_seeds(text: &str) -> std::result::Result<Chosen, String> {
+/// `0-4,9` as seeds.
+pub fn parse_seeds(text: &str) -> std::result::Result<Chosen, String> {
     seeds_of(text).map(Chosen)
 }

@@ -5,7 +5,7 @@ mod lock;
 mod output;
 mod runner;
 
-pub use args::Args;
+pub use args::{Args, Chosen, parse_seeds};
 
 use super::{Context, Outcome, places::Places};
 use crate::error::{Error, Result};
