@@ -264,3 +264,28 @@ fn a_robot_of_ones_own_demonstrates_all_tasks() {
         hilt(&["evaluate", "--task", task, "--episodes", "1", "--policy", &at("policy.safetensors")]).assert().failure();
     }
 }
+
+/// `docs/how-data-flow.md`, followed.
+#[test]
+fn the_chain_of_the_page_runs_and_its_rows_are_what_it_says() {
+    let page = fs::read_to_string("docs/how-data-flow.md").expect("the page");
+    let chain = page.split("```sh\n").nth(1).and_then(|rest| rest.split("```").next()).expect("a chain of commands");
+    let dir = tempfile::tempdir().expect("a directory");
+    spoilt(dir.path(), &[], &[]);
+    let bin = Path::new(env!("CARGO_BIN_EXE_hilt")).parent().expect("a directory").display().to_string();
+    let path = format!("{bin}:{}", std::env::var("PATH").expect("set"));
+    let ended = std::process::Command::new("bash").args(["-euc", chain]).env("PATH", path).current_dir(dir.path()).output();
+    let ended = ended.expect("bash");
+    assert!(ended.status.success(), "{}", String::from_utf8_lossy(&ended.stderr));
+    for file in ["plans.parquet", "dynamics.safetensors", "policy.safetensors", "evaluation.json", "rollouts/episode-00001.mcap"]
+    {
+        assert!(dir.path().join(file).is_file(), "{file}");
+    }
+    let layout = dataset::read(&dir.path().join("dataset/train")).expect("a dataset").layout;
+    let rows = [("state", &layout.state), ("action", &layout.action)];
+    for (row, span) in rows.into_iter().flat_map(|(row, spans)| spans.iter().map(move |span| (row, span))) {
+        let holds = serde_json::to_value(span.holds).expect("a name");
+        let line = format!("| {row} | {} | {} | {} |", span.name, holds.as_str().expect("a name"), span.entries.join(", "));
+        assert!(page.contains(&line), "the page does not have: {line}");
+    }
+}
