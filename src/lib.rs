@@ -7,7 +7,7 @@
 //!
 //! | paper | here | what it is |
 //! |---|---|---|
-//! | s_t, a_t | [`state`], [`mod@layout`] | state of 25 to 32 numbers (rad, rad/s, m, quaternions x y z w); nine joint velocities \[rad/s\]; what each entry is |
+//! | s_t, a_t | [`state`], [`mod@layout`] | state (of the paper's robot 25 to 32 numbers: rad, rad/s, m, quaternions x y z w); a velocity for each joint \[rad/s, m/s\]; what each entry is |
 //! | d = <(s_t^E, a_t^E)> | [`demo::Demo`] | a demonstration: T + 1 states, T actions |
 //! | pi_theta | [`learn::Policy`] | Gaussian: mean network, log standard deviations |
 //! | f_phi | [`learn::Dynamics`] | the next state from a state and an action |
@@ -29,9 +29,9 @@
 //!
 //! A module imports only from those before it, and no files import each other in circles; `tests/architecture` holds both.
 //!
-//! - leaves that all may use: [`error`], [`guard`], [`interrupt`], [`math`], [`seed`], [`table`], [`tensor`], [`words`]
+//! - leaves that all may use: [`error`], [`guard`], [`interrupt`], [`joints`] (a number a joint), [`math`], [`seed`], [`table`], [`tensor`], [`words`]
 //! - [`nn`]: networks and their engine, knows no robots
-//! - contracts: [`mod@layout`] (what the entries of a state and an action are: all that learning knows of robot and task), [`task`], [`state`], [`scene`], [`demo`], [`mod@env`]; [`robot`]; [`config`], [`pulse`]
+//! - contracts: [`mod@layout`] (what the entries of a state and an action are: all that learning knows of robot and task), [`task`], [`state`], [`robot`] (robots from files: kinematics, distances, inverse kinematics), [`scene`] (who acts, and what stands where), [`demo`], [`mod@env`]; [`config`], [`pulse`]
 //! - [`tasks`], then [`plan`] (scene to demonstration) and [`sim`] (contact physics, the only home of rapier)
 //! - [`data`]: files, the only home of MCAP, Arrow, Parquet and safetensors; knows no learning
 //! - [`learn`]: networks of policy and dynamics, losses, methods, and the loop around them; knows neither files nor simulator

@@ -188,7 +188,11 @@ fn check_says_what_is_doubtful_and_draws_the_robot() {
     assert!(sound.contains("0.45 m") && sound.contains('#'), "{sound}");
     let doubtful = spoilt(
         dir.path(),
-        &[("armature = 0.1", "armature = 0.0"), ("0.44781, 1.64861", "0.44781, 1.2")],
+        &[
+            ("xyz_m = [0.0, 0.0, 0.11]", "xyz_m = [0.0, 0.0, 0.03]"),
+            ("armature = 0.1", "armature = 0.0"),
+            ("0.44781, 1.64861", "0.44781, 1.2"),
+        ],
         &[
             ("effort=\"60\"", "effort=\"2\""),
             ("ixx=\"0.02\" iyy=\"0.02\"", "ixx=\"0.09\" iyy=\"0.02\""),
@@ -202,6 +206,7 @@ fn check_says_what_is_doubtful_and_draws_the_robot() {
         "shoulder bears",
         "link upper: moments of inertia",
         "no two fingers close on each other",
+        "the tool point lies inside of link palm",
     ] {
         assert!(said.contains(part), "{part} is not in {said}");
     }

@@ -134,6 +134,13 @@ fn doubt_ready(robot: &Robot, poses: &[Isometry3<f64>], doubts: &mut Vec<String>
             lean.to_degrees()
         ));
     }
+    let point = Solid::Capsule { from: tool.translation.vector.into(), to: tool.translation.vector.into(), radius_m: 0.0 };
+    if let Some((link, _)) = robot.solids(poses).iter().find(|(_, solid)| solid.distance_m(&point) <= 0.0) {
+        doubts.push(format!(
+            "the tool point lies inside of link {}: it is to be between the finger pads (tool.xyz_m)",
+            robot.links[*link].name
+        ));
+    }
     let solids = |link: usize| robot.links[link].shapes.iter().map(move |shape| Solid::of(shape, &poses[link]));
     let parent = |link: usize| link.checked_sub(1).map(|joint| robot.joints[joint].parent);
     for a in 0..robot.links.len() {
