@@ -102,3 +102,28 @@ fn names_that_make_can_take_work() {
         assert!(run.all(words).is_empty(), "{words:?}");
     }
 }
+
+/// Another robot has runs of its own, and what its files say belongs to the settings.
+#[test]
+fn a_robot_from_a_file_is_planned_for_and_a_changed_one_is_noticed() {
+    let tree = tree();
+    let robots = tree.path().join("mine");
+    fs::create_dir(&robots).expect("a directory");
+    for file in ["five.toml", "five.urdf", "wrist.stl"] {
+        let from = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("fixtures/robots").join(file);
+        fs::copy(from, robots.join(file)).expect("copied");
+    }
+    let plans = || {
+        let goal = ["runs/five/pick-up/plans.parquet", "ROBOT=mine/five.toml", "SET=plan.episodes=2"];
+        let output = command(tree.path(), &goal).output().expect("make runs");
+        assert!(output.status.success(), "{}", text(&output.stderr));
+        let settings = fs::read_to_string(tree.path().join("runs/five/pick-up/settings/plan.toml")).expect("settings");
+        settings.lines().find(|line| line.starts_with("# robot five ")).expect("the robot's content").to_string()
+    };
+    let first = plans();
+    assert!(tree.path().join("runs/five/pick-up/plans.parquet").is_file() && plans() == first);
+    let file = robots.join("five.toml");
+    let changed = fs::read_to_string(&file).expect("text").replace("speed = 0.1", "speed = 0.12");
+    fs::write(&file, changed).expect("written");
+    assert_ne!(plans(), first);
+}
