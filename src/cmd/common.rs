@@ -157,7 +157,7 @@ pub fn read_network<N>(
     let (tensors, description, made, content) = weights::read_hashed(path, kind)?;
     same_task(path, made.task, pipeline.task)?;
     let network = make(&tensors, &with_layout(description)).map_err(|why| Error::input(path, why))?;
-    same_layout(path, layout(&network), pipeline)?;
+    same_layout(path, &made, layout(&network), pipeline)?;
     Ok((network, made, content))
 }
 
@@ -179,15 +179,16 @@ pub fn same_robot(path: &Path, made: &Provenance, pipeline: &Pipeline) -> Result
     Err(Error::input(path, format!("was made by robot {theirs}, but {ours} is asked for{hint}, or make it anew")))
 }
 
-/// Refuses rows that are not those of the robot in the task.
+/// Refuses rows that are not those of the robot in the task: by the names of the robots that made them, where those differ.
 ///
 /// # Errors
-/// [`Error::Input`] with the numbers of both.
-pub fn same_layout(path: &Path, layout: &Layout, pipeline: &Pipeline) -> Result<()> {
+/// [`Error::Input`] with the robots, or the numbers of both.
+pub fn same_layout(path: &Path, made: &Provenance, layout: &Layout, pipeline: &Pipeline) -> Result<()> {
     let ours = pipeline.task.layout(&pipeline.robot);
     if *layout == *ours {
         return Ok(());
     }
+    same_robot(path, made, pipeline)?;
     let [theirs, ours] =
         [layout, &*ours].map(|l| format!("states of {} numbers and actions of {}", l.state_dim(), l.action_dim()));
     let robot = &pipeline.robot.name;

@@ -117,7 +117,7 @@ fn read_policy(path: &Path, pipeline: &Pipeline) -> Result<(Policy, Provenance, 
 }
 
 /// Sections of the settings that make an episode what it is.
-const WORLD: [&str; 2] = ["scene", "simulate"];
+const WORLD: [&str; 3] = ["scene", "simulate", "robot"];
 
 /// In what the episodes differ from those that the policy was trained for.
 fn of_scene(trained: &Value, here: &Value) -> Vec<Difference> {

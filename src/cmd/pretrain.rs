@@ -111,7 +111,7 @@ pub fn demos(dir: &Path, pipeline: &Pipeline) -> Result<Demos> {
     let mut files = BTreeMap::new();
     let mut read = |name: &str| -> Result<Vec<Demo>> {
         let found = dataset::read_for(&dir.join(name), pipeline.task)?;
-        same_layout(&dir.join(name), &found.layout, pipeline)?;
+        same_layout(&dir.join(name), &found.provenance, &found.layout, pipeline)?;
         files.extend(found.files.into_iter().map(|(file, hash)| (format!("{name}/{file}"), hash)));
         Ok(found.demos)
     };
