@@ -1,7 +1,7 @@
 use super::places::{Content, Places};
 use super::{Context, Outcome, output};
 use crate::data::atomic;
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::report::render::robot_png;
 use crate::report::table::text_table;
 use crate::robot::Robot;
@@ -9,9 +9,8 @@ use crate::robot::check::{Findings, check};
 use crate::robot::file::description::Read;
 use crate::robot::file::{self, built_in};
 use crate::robot::model::JointKind;
-use crate::words::unknown;
 use serde_json::json;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::Arc;
 
 /// Size of a picture of a robot \[pixels\].
@@ -57,7 +56,11 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome> {
         places = places.write("--png", out, Content::Png);
     }
     places.check(&context.console)?;
-    let Read { robot, remarks } = if is_file { file::read(&args.robot)? } else { named(&args.robot)? };
+    let Read { robot, remarks } = if is_file {
+        file::read(&args.robot)?
+    } else {
+        Read { robot: built_in::find(&args.robot.display().to_string())?, remarks: Vec::new() }
+    };
     let robot = Arc::new(robot);
     let findings = check(&robot, &context.interrupt)?;
     if let Some(out) = &args.png {
@@ -72,14 +75,6 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome> {
         output::print(&words(&robot, &remarks, &findings))?;
     }
     Ok(Outcome::Done)
-}
-
-fn named(name: &Path) -> Result<Read> {
-    let name = name.display().to_string();
-    match built_in::named(&name) {
-        Some(robot) => Ok(Read { robot: robot.map_err(Error::Failed)?, remarks: Vec::new() }),
-        None => Err(Error::Usage(format!("{}; or name a file that ends in .toml", unknown("robot", &name, &built_in::names())))),
-    }
 }
 
 fn words(robot: &Robot, remarks: &[String], findings: &Findings) -> String {

@@ -95,15 +95,15 @@ impl Stage {
         ["plan", "simulate", "convert", "pretrain", "train", "evaluate"][self as usize]
     }
 
-    /// The sections of a pipeline file that can change what this stage writes, given its input files.
+    /// The sections of a pipeline file, and the robot, that can change what this stage writes, given its input files.
     pub fn sections(self) -> &'static [&'static str] {
         match self {
-            Stage::Plan => &["scene", "plan"],
-            Stage::Simulate => &["simulate"],
-            Stage::Convert => &["convert"],
-            Stage::Pretrain => &["scene", "simulate", "pretrain"],
-            Stage::Train => &["scene", "simulate", "train"],
-            Stage::Evaluate => &["scene", "plan", "simulate", "evaluate"],
+            Stage::Plan => &["robot", "scene", "plan"],
+            Stage::Simulate => &["robot", "simulate"],
+            Stage::Convert => &["robot", "convert"],
+            Stage::Pretrain => &["robot", "scene", "simulate", "pretrain"],
+            Stage::Train => &["robot", "scene", "simulate", "train"],
+            Stage::Evaluate => &["robot", "scene", "plan", "simulate", "evaluate"],
         }
     }
 }
@@ -141,7 +141,7 @@ impl Pipeline {
         if stage.is_some() && self.robot.is_default() {
             table.remove("robot");
         }
-        table.retain(|key, _| ["task", "robot"].contains(&key) || stage.is_none_or(|stage| stage.sections().contains(&key)));
+        table.retain(|key, _| key == "task" || stage.is_none_or(|stage| stage.sections().contains(&key)));
         toml::to_string(&table).map_err(|e| Error::Failed(format!("settings cannot be written as TOML: {e}")))
     }
 
@@ -153,6 +153,7 @@ impl Pipeline {
     pub fn to_json(&self, stage: Stage) -> Result<serde_json::Value> {
         let mut table = self.to_table()?;
         table.retain(|key, _| stage.sections().contains(&key));
+        table.remove("robot");
         if !self.robot.is_default() {
             let robot = [("name", self.robot.name.clone()), ("content", self.robot.content())];
             table.insert("robot".into(), toml::Table::from_iter(robot.map(|(key, value)| (key.into(), value.into()))).into());

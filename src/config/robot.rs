@@ -2,7 +2,6 @@
 
 use crate::robot::Robot;
 use crate::robot::file::{self, built_in};
-use crate::words::unknown;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use std::ops::Deref;
 use std::path::{Path, absolute};
@@ -34,9 +33,7 @@ impl ChosenRobot {
                 let path = absolute(said).map_err(|why| format!("{said}: {why}"))?;
                 (path.display().to_string(), file::read(Path::new(said)).map_err(|why| why.to_string())?.robot)
             }
-            None => {
-                return Err(format!("{}; or name a file that ends in .{ENDING}", unknown("robot", said, &built_in::names())));
-            }
+            None => (said.to_string(), built_in::find(said).map_err(|why| why.to_string())?),
         };
         Ok(ChosenRobot { said, robot: Arc::new(robot) })
     }

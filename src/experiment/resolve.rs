@@ -107,7 +107,7 @@ fn stage_settings(
     let pipeline = Pipeline::load(source, &sets)?;
     check_ready_pose(&pipeline.robot, &pipeline.scene)?;
     // What another stage reads changes nothing here.
-    let read = sets.iter().filter(|set| section_of(set) == "robot" || stage.sections().contains(&section_of(set)));
+    let read = sets.iter().filter(|set| stage.sections().contains(&section_of(set)));
     let words = words.iter().cloned().chain(read.flat_map(|set| ["--set".to_string(), set.clone()])).collect();
     Ok(StageSettings { words, json: pipeline.to_json(stage)?, pipeline })
 }

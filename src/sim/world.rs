@@ -25,7 +25,6 @@ const REST_M_S: Real = 0.005;
 /// The simulated scene. Stepping it depends on nothing but its own state and the actions.
 #[derive(Serialize, Deserialize)]
 pub struct World {
-    robot: Arc<Robot>,
     scene: Scene,
     settings: Physics,
     physics: PhysicsWorld,
@@ -70,21 +69,12 @@ impl World {
         // A step of no duration finds the contacts and moves nothing.
         physics.step();
         physics.integration_parameters = settings.parameters(settings.near);
-        World {
-            robot: Arc::clone(&scene.robot),
-            scene: scene.clone(),
-            settings,
-            physics,
-            handle,
-            block,
-            base,
-            block_quaternion: state.block.quaternion_xyzw,
-        }
+        World { scene: scene.clone(), settings, physics, handle, block, base, block_quaternion: state.block.quaternion_xyzw }
     }
 
     /// One control step of 50 ms with the joint velocities `executed` \[rad/s, m/s\] (used in f32).
     pub fn step(&mut self, executed: &Action) {
-        arm::command(&mut self.physics, &self.robot, self.handle, executed);
+        arm::command(&mut self.physics, &self.scene.robot, self.handle, executed);
         let grain = self.grain();
         self.physics.integration_parameters = self.settings.parameters(grain);
         for _ in 0..grain.steps {
@@ -102,7 +92,7 @@ impl World {
 
     /// What there is to see now. Forces are those of the physics step that led here (0 in a world that was just made or set).
     pub fn observe(&mut self) -> Observation {
-        let (q, dq) = arm::read(&self.physics, &self.robot, self.handle);
+        let (q, dq) = arm::read(&self.physics, &self.scene.robot, self.handle);
         let body = &self.physics.bodies[self.block];
         let mut block = to_pose(body.position());
         let agreement: f64 = block.quaternion_xyzw.iter().zip(&self.block_quaternion).map(|(a, b)| a * b).sum();
@@ -111,18 +101,18 @@ impl World {
         }
         self.block_quaternion = block.quaternion_xyzw;
         Observation {
-            robot: Arc::clone(&self.robot),
+            robot: Arc::clone(&self.scene.robot),
             state: State { q, dq, block, context: self.scene.context },
-            tool_m: self.robot.tool_pose(&q).translation.vector.into(),
+            tool_m: self.scene.robot.tool_pose(&q).translation.vector.into(),
             base_now: self.base.map(|handle| to_pose(self.physics.bodies[handle].position())),
-            contacts: contacts::read(&self.physics, &self.robot),
+            contacts: contacts::read(&self.physics, &self.scene.robot),
             block_speed_m_s: f64::from(body.linvel().length()),
         }
     }
 
     /// Poses of the robot's links, from its joint positions.
     pub fn link_poses(&self) -> Vec<Isometry3<f64>> {
-        self.robot.link_poses(&arm::read(&self.physics, &self.robot, self.handle).0)
+        self.scene.robot.link_poses(&arm::read(&self.physics, &self.scene.robot, self.handle).0)
     }
 
     /// Puts the world into a recorded state: exact in joint angles, joint velocities and block pose. The block is at rest, the base
@@ -135,7 +125,7 @@ impl World {
 
     /// Everything that the future depends on, as bytes.
     pub fn snapshot(&self) -> Vec<u8> {
-        postcard::to_stdvec(self).expect("the world is plain data")
+        postcard::to_stdvec(&(&self.scene.robot, self)).expect("the world is plain data")
     }
 
     /// The world of a [`World::snapshot`]; it continues bit for bit.
@@ -143,10 +133,10 @@ impl World {
     /// # Errors
     /// [`Error::Failed`] when the bytes are no snapshot of this version.
     pub fn restore(bytes: &[u8]) -> Result<World> {
-        let mut world: World = postcard::from_bytes(bytes).map_err(|e| {
+        let (robot, mut world): (Arc<Robot>, World) = postcard::from_bytes(bytes).map_err(|e| {
             Error::Failed(format!("{} bytes are no snapshot of a world by this version of hilt: {e}", bytes.len()))
         })?;
-        world.scene.robot = Arc::clone(&world.robot);
+        world.scene.robot = robot;
         Ok(world)
     }
 }

@@ -116,7 +116,7 @@ fn edits_of_info_are_named_for_what_they_are() {
 fn a_dataset_of_another_task_is_refused() {
     let (_dir, root) = written(Task::PickUp);
     let message = dataset::read_for(&root, Task::Stack).unwrap_err().to_string();
-    assert!(message.contains("pick-up (states of 25 numbers), not of stack"), "{message}");
+    assert!(message.contains("pick-up (states of 25 numbers), not of stack (32)"), "{message}");
 }
 
 /// Rewrites the data file as another program would, with one number changed.

@@ -8,6 +8,7 @@ use crate::data::{ContentHash, Provenance, parquet_file};
 use crate::demo::Demo;
 use crate::error::{Error, Result};
 use crate::layout::Layout;
+use crate::robot::file::built_in::paper_robot;
 use crate::task::Task;
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -130,8 +131,11 @@ fn also_rewritten(error: Error, rewritten: Option<&Path>) -> Error {
 pub fn read_for(root: &Path, task: Task) -> Result<Dataset> {
     let dataset = read(root)?;
     if dataset.task != task {
-        let (found, dim) = (dataset.task, dataset.layout.state_dim());
-        let message = format!("is a dataset of {found} (states of {dim} numbers), not of {task}");
+        // What a task adds that stays as it is does not depend on the robot.
+        let fixed = |layout: &Layout| layout.state_dim() - layout.changing();
+        let (found, layout) = (dataset.task, &dataset.layout);
+        let (dim, wanted) = (layout.state_dim(), layout.changing() + fixed(&task.layout(&paper_robot())));
+        let message = format!("is a dataset of {found} (states of {dim} numbers), not of {task} ({wanted})");
         return Err(Error::input(root, message));
     }
     Ok(dataset)

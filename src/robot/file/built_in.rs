@@ -3,7 +3,9 @@
 use super::assemble::assemble;
 use super::description::Description;
 use super::xml;
+use crate::error::{Error, Result};
 use crate::robot::model::Robot;
+use crate::words::unknown;
 use std::sync::{Arc, LazyLock};
 
 /// Name, TOML and URDF of each.
@@ -30,13 +32,22 @@ pub fn names() -> [&'static str; FILES.len()] {
 ///
 /// # Errors
 /// What is wrong with its files.
-pub fn named(name: &str) -> Option<Result<Robot, String>> {
+pub fn named(name: &str) -> Option<std::result::Result<Robot, String>> {
     let (_, description, urdf) = FILES.iter().find(|(known, ..)| *known == name)?;
     let read = || {
         let (description, document) = (Description::parse(description)?, xml::read(urdf)?);
         assemble(&description, &document, &|mesh| Err(format!("{mesh}: a built-in robot has no meshes"))).map(|read| read.robot)
     };
     Some(read())
+}
+
+/// As [`named`], for a name that a person has given.
+///
+/// # Errors
+/// [`Error::Usage`] says which names there are.
+pub fn find(name: &str) -> Result<Robot> {
+    let unknown = || Error::Usage(format!("{}; or name a file that ends in .toml", unknown("robot", name, &names())));
+    named(name).ok_or_else(unknown)?.map_err(Error::Failed)
 }
 
 /// All of them.
