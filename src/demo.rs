@@ -3,9 +3,10 @@
 use crate::joints::Joints;
 use crate::layout::Layout;
 use crate::scene::Scene;
-use crate::state::{Action, State};
+use crate::state::{Action, Pose, State};
 use crate::task::FailureClass;
 use serde::{Deserialize, Serialize};
+use std::collections::BTreeSet;
 use std::sync::Arc;
 
 /// No angle \[rad\], position \[m\], velocity \[rad/s, m/s\] or command of this world is larger: what is comes from a simulation that broke down
@@ -20,11 +21,11 @@ pub enum Phase {
     Approach,
     /// Fingers close, arm still.
     Close,
-    /// Lift, carry and lower with the block in the hand.
+    /// Lift, carry and lower with the object in the hand.
     Carry,
     /// Fingers open, arm still.
     Open,
-    /// Straight up and away from the released block.
+    /// Straight up and away from the released object.
     Retreat,
 }
 
@@ -38,15 +39,22 @@ impl Phase {
     }
 }
 
-/// What is known after a control step beyond the state itself.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+/// What touches an object.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Touch {
+    /// Normal force between each finger and the object \[N\].
+    pub fingers_n: Joints,
+    /// Whether it touches the table.
+    pub table: bool,
+    /// Which other objects it touches, by their places in the task.
+    pub objects: BTreeSet<usize>,
+}
+
+/// What touches what.
+#[derive(Clone, Debug, PartialEq)]
 pub struct Contacts {
-    /// Normal force between each finger and the block \[N\].
-    pub finger_block_n: Joints,
-    /// Whether the block touches the table.
-    pub block_table: bool,
-    /// Whether the block touches the base block.
-    pub block_base: bool,
+    /// Of each object of the task.
+    pub objects: Vec<Touch>,
     /// Whether any robot link touches an obstacle.
     pub robot_obstacle: bool,
     /// Whether any robot link touches the table.
@@ -54,33 +62,35 @@ pub struct Contacts {
 }
 
 impl Contacts {
-    /// Nothing touches anything, of a hand with so many fingers.
-    pub fn none(fingers: usize) -> Self {
-        Contacts {
-            finger_block_n: Joints::zeros(fingers),
-            block_table: false,
-            block_base: false,
-            robot_obstacle: false,
-            robot_table: false,
-        }
+    /// Nothing touches anything, of a hand with so many fingers and so many objects.
+    pub fn none(fingers: usize, objects: usize) -> Self {
+        let untouched = Touch { fingers_n: Joints::zeros(fingers), table: false, objects: BTreeSet::new() };
+        Contacts { objects: vec![untouched; objects], robot_obstacle: false, robot_table: false }
     }
 }
 
+/// An object now.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Body {
+    /// Where it is; one that no goal moves may have been pushed.
+    pub pose: Pose,
+    /// Speed of its centre \[m/s\].
+    pub speed_m_s: f64,
+}
+
 /// One control step: the state before it, the action taken in it, and what held in that state.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Step {
     /// s_t.
     pub state: State,
-    /// Pose of the base block now (it may be pushed), if the task has one.
-    pub base_now: Option<crate::state::Pose>,
+    /// The task's objects.
+    pub objects: Vec<Body>,
     /// What the controller asked for \[rad/s, m/s\].
     pub commanded: Action,
     /// What the motors were given: commanded + noise + pulse, clamped to the joint velocity limits \[rad/s, m/s\].
     pub executed: Action,
     /// Contacts in s_t.
     pub contacts: Contacts,
-    /// Speed of the block's centre \[m/s\].
-    pub block_speed_m_s: f64,
     /// Reward earned in this step (each milestone once per episode).
     pub reward: f64,
     /// Which of `task.condition_names()` hold in s_t, in that order.
@@ -90,7 +100,7 @@ pub struct Step {
 }
 
 /// An executed episode: T steps and the state after the last.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Episode {
     /// Episode number within its run (also its random stream).
     pub index: u64,

@@ -13,6 +13,8 @@ pub const CONTROL_DT_S: f64 = 1.0 / CONTROL_HZ as f64;
 
 /// Entries of a pose: x y z, qx qy qz qw.
 const POSE_DIM: usize = 7;
+/// Entries of a point: x y z.
+const POINT_DIM: usize = 3;
 
 /// a_t: a velocity command for each joint \[rad/s, m/s\].
 pub type Action = Joints;
@@ -57,77 +59,55 @@ impl Pose {
     }
 }
 
-/// The constants of an episode that the state carries: inputs of policy and dynamics, never outputs.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Context {
-    /// Pick-up: nothing.
-    None,
-    /// Pick-and-place: the goal position of the block's centre \[m\].
-    Goal([f64; 3]),
-    /// Stack: the pose of the base block.
-    Base(Pose),
-}
-
-/// s_t: what the policy sees at a control step. Vector form: joint positions, joint velocities, block pose (7), context (0, 3 or 7).
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+/// s_t: what the policy sees at a control step. Vector form: joint positions, joint velocities, a pose of each object (7), goals (3 each).
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct State {
     /// Joint positions \[rad, m\].
     pub q: Joints,
     /// Joint velocities \[rad/s, m/s\].
     pub dq: Joints,
-    /// Pose of the block to move; its quaternion is sign-continuous along an episode.
-    pub block: Pose,
-    /// What the task adds.
-    pub context: Context,
-}
-
-impl Context {
-    /// Its numbers, in the order of a state.
-    fn values(&self) -> Vec<f64> {
-        match self {
-            Context::None => Vec::new(),
-            Context::Goal(goal) => goal.to_vec(),
-            Context::Base(base) => base.to_array().to_vec(),
-        }
-    }
+    /// Poses of the task's objects, in its order: of those that goals move as they are now, each quaternion sign-continuous along an episode;
+    /// of the others as they stood at the start.
+    pub objects: Vec<Pose>,
+    /// Goals that are places on the table: where the object's centre is to be \[m\].
+    pub goals: Vec<[f64; POINT_DIM]>,
 }
 
 impl State {
     /// The state as a row (f32: the simulator's own precision).
     pub fn to_row(&self) -> Vec<f32> {
         let joints = self.q.iter().chain(&self.dq).copied();
-        joints.chain(self.block.to_array()).chain(self.context.values()).map(|v| v as f32).collect()
+        let poses = self.objects.iter().flat_map(|pose| pose.to_array());
+        joints.chain(poses).chain(self.goals.iter().flatten().copied()).map(|v| v as f32).collect()
     }
 
     /// The inverse of [`State::to_row`], of a robot with so many joints; `None` when the row is not as long as the task's states.
-    pub fn from_row(task: Task, joints: usize, row: &[f32]) -> Option<Self> {
+    pub fn from_row(task: &Task, joints: usize, row: &[f32]) -> Option<Self> {
         let row: Vec<f64> = row.iter().map(|v| f64::from(*v)).collect();
         let (q, row) = row.split_at_checked(joints)?;
         let (dq, row) = row.split_at_checked(joints)?;
-        let (block, extra) = row.split_first_chunk::<POSE_DIM>()?;
-        let context = match task {
-            Task::PickUp => extra.is_empty().then_some(Context::None),
-            Task::PickAndPlace => extra.try_into().ok().map(Context::Goal),
-            Task::Stack => <[f64; POSE_DIM]>::try_from(extra).ok().map(|pose| Context::Base(Pose::from_array(pose))),
-        };
-        Some(State { q: Joints::of(q)?, dq: Joints::of(dq)?, block: Pose::from_array(*block), context: context? })
+        let (poses, points) = row.split_at_checked(POSE_DIM * task.objects.len())?;
+        let (goals, rest) = points.as_chunks::<POINT_DIM>();
+        if !rest.is_empty() || goals.len() != task.goal_names().len() {
+            return None;
+        }
+        let objects = poses.as_chunks::<POSE_DIM>().0.iter().map(|pose| Pose::from_array(*pose)).collect();
+        Some(State { q: Joints::of(q)?, dq: Joints::of(dq)?, objects, goals: goals.to_vec() })
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::task::built_in::{pick_and_place, pick_up, stack};
 
     #[test]
     fn a_row_round_trips_for_any_number_of_joints() {
-        for (task, joints, dim) in
-            [(Task::PickUp, 9, 25), (Task::PickAndPlace, 9, 28), (Task::Stack, 7, 28), (Task::Stack, 9, 32)]
-        {
+        for (task, joints, dim) in [(pick_up(), 9, 25), (pick_and_place(), 9, 28), (stack(), 7, 28), (stack(), 9, 32)] {
             let row: Vec<f32> = (0..dim).map(|i| i as f32 * 0.25).collect();
-            let state = State::from_row(task, joints, &row).expect("row has the task's length");
+            let state = State::from_row(&task, joints, &row).expect("row has the task's length");
             assert_eq!(state.to_row(), row);
-            assert!(State::from_row(task, joints, &row[1..]).is_none());
+            assert!(State::from_row(&task, joints, &row[1..]).is_none());
         }
     }
 }

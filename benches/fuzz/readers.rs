@@ -100,7 +100,7 @@ impl Reader {
                 self.network = Some((kept.tensors, kept.meta));
             }
             "summary" => {
-                let made = hilt::data::Provenance::new("evaluate", hilt::tasks::Task::PickUp, json!({}), 0);
+                let made = hilt::data::Provenance::new("evaluate", "pick-up", json!({}), 0);
                 let content = json!({ "success_rate": 0.5, "wilson_95": [0.1, 0.9], "failures": { "dropped": 1 } });
                 self.whole = json_file::encode(Path::new("summary"), &content, &made).expect("a summary");
             }

@@ -21,7 +21,7 @@ pub fn fixture(name: &str) -> PathBuf {
 }
 
 fn provenance(stage: &str) -> Provenance {
-    Provenance::new(stage, hilt::tasks::Task::PickUp, json!({ "plan": { "speed": 1.0 } }), 3)
+    Provenance::new(stage, "pick-up", json!({ "plan": { "speed": 1.0 } }), 3)
 }
 
 /// A short recording.

@@ -1,12 +1,12 @@
 //! The flags that all stages share: which settings, which seed.
 
 use super::places::Places;
-use crate::config::{Pipeline, Preset, Source, Stage};
+use crate::config::{self, ChosenTask, Pipeline, Preset, Source, Stage};
 use crate::data::{ContentHash, Provenance, weights};
 use crate::error::{Error, Result};
 use crate::layout::Layout;
 use crate::plan::check_ready_pose;
-use crate::task::Task;
+use crate::task::built_in;
 use crate::tasks::with_layout;
 use crate::tensor::NamedTensor;
 use serde_json::Value;
@@ -18,9 +18,9 @@ const RUNS: &str = "runs";
 /// Which settings: a preset of a task or a pipeline file, then `--set`, then flags of the stage.
 #[derive(Debug, clap::Args)]
 pub struct SettingsArgs {
-    /// Task: pick-up, pick-and-place or stack
-    #[arg(long, value_name = "TASK")]
-    task: Option<Task>,
+    /// Task: pick-up, pick-and-place, stack, or the TOML file of another
+    #[arg(long, value_name = "NAME|FILE.toml")]
+    task: Option<String>,
     /// Robot: jaco, panda, ur5e, or the TOML file of another [default: that of the pipeline, jaco]
     #[arg(long, value_name = "NAME|FILE.toml")]
     robot: Option<String>,
@@ -48,8 +48,8 @@ pub type Flag<'a> = (&'a str, Option<String>);
 impl SettingsArgs {
     /// What these settings are read from, where that is a file.
     pub fn places(&self) -> Places {
-        let robot = self.robot.as_deref().map(Path::new).filter(|path| path.is_file());
-        Places::new().read_all(self.pipeline.as_deref().into_iter().chain(robot))
+        let said = [self.robot.as_deref(), self.task.as_deref()].into_iter().flatten().map(Path::new);
+        Places::new().read_all(self.pipeline.as_deref().into_iter().chain(said.filter(|path| path.is_file())))
     }
 
     /// The resolved settings; `flags` are dotted keys with the values of the stage's own flags, where given.
@@ -57,12 +57,16 @@ impl SettingsArgs {
     /// # Errors
     /// [`Error::Usage`] when neither task nor pipeline file is given; see [`Pipeline::load`].
     pub fn resolve(&self, flags: &[Flag]) -> Result<Pipeline> {
-        let source = match (&self.pipeline, self.task) {
-            (Some(path), task) => Source::File(path.clone(), task),
-            (None, Some(task)) => Source::BuiltIn(task, self.preset.unwrap_or_default()),
-            (None, None) => {
-                let tasks = Task::ALL.map(Task::name).join(", ");
-                return Err(Error::Usage(format!("which task? give --task ({tasks}) or --pipeline FILE")));
+        let refuse = |why: String| Error::Usage(format!("--task: {why}"));
+        let task = self.task.as_deref().map(ChosenTask::read).transpose().map_err(refuse)?;
+        let source = match (&self.pipeline, task, &self.task) {
+            (Some(path), task, _) => Source::File(path.clone(), task),
+            // A task's file is a pipeline file.
+            (None, Some(_), Some(said)) if self.preset.is_none() && config::is_file(said) => Source::File(said.into(), None),
+            (None, Some(task), _) => Source::BuiltIn(task, self.preset.unwrap_or_default()),
+            (None, None, _) => {
+                let tasks = built_in::names().join(", ");
+                return Err(Error::Usage(format!("which task? give --task ({tasks}, or a file) or --pipeline FILE")));
             }
         };
         let robot = ("robot", self.robot.clone());
@@ -83,7 +87,7 @@ impl SettingsArgs {
     /// # Errors
     /// [`Error::Failed`] when a setting has no form in JSON.
     pub fn provenance(&self, stage: Stage, pipeline: &Pipeline, inputs: &[(&str, ContentHash)]) -> Result<Provenance> {
-        let provenance = Provenance::new(stage.name(), pipeline.task, pipeline.to_json(stage)?, self.seed);
+        let provenance = Provenance::new(stage.name(), &pipeline.task.name, pipeline.to_json(stage)?, self.seed);
         Ok(inputs.iter().fold(provenance, |provenance, (role, content)| provenance.with_input(role, content)))
     }
 }
@@ -126,21 +130,30 @@ fn in_words_of_flags(error: Error, given: &[(String, String)]) -> Error {
 /// The given path, or `name` under `runs/<task>/`, of another robot than the paper's under `runs/<robot>/<task>/`.
 pub fn path_or(given: Option<&Path>, pipeline: &Pipeline, name: &str) -> PathBuf {
     let robot = if pipeline.robot.is_default() { "" } else { pipeline.robot.name.as_str() };
-    given.map_or_else(|| Path::new(RUNS).join(robot).join(pipeline.task.name()).join(name), Path::to_path_buf)
+    given.map_or_else(|| Path::new(RUNS).join(robot).join(&pipeline.task.name).join(name), Path::to_path_buf)
 }
 
-/// Refuses an input that was made for another task.
+/// Refuses an input that was made for another task, or for one of the same name that says something else.
 ///
 /// # Errors
 /// [`Error::Input`] naming both tasks.
-pub fn same_task(path: &Path, made_for: Task, task: Task) -> Result<()> {
-    if made_for == task {
+pub fn same_task(path: &Path, made: &Provenance, pipeline: &Pipeline) -> Result<()> {
+    let (theirs, ours) = (&made.task, &pipeline.task.name);
+    if theirs != ours {
+        return Err(Error::input(
+            path,
+            format!("was made for task {theirs}, but task {ours} is asked for; give --task {theirs} or another file"),
+        ));
+    }
+    // The paper's tasks leave it unsaid.
+    let same = match made.settings["task"]["content"].as_str() {
+        None => pipeline.task.is_of_the_paper(),
+        Some(content) => content == pipeline.task.content(),
+    };
+    if same {
         return Ok(());
     }
-    Err(Error::input(
-        path,
-        format!("was made for task {made_for}, but task {task} is asked for; give --task {made_for} or another file"),
-    ))
+    Err(Error::input(path, format!("was made for another task of the name {ours}: its file has changed since; make it anew")))
 }
 
 /// A network of the robot and task of `pipeline` from its weights: `make` makes it of their tensors and description, `layout` says what its rows hold.
@@ -155,7 +168,7 @@ pub fn read_network<N>(
     layout: fn(&N) -> &Layout,
 ) -> Result<(N, Provenance, ContentHash)> {
     let (tensors, description, made, content) = weights::read_hashed(path, kind)?;
-    same_task(path, made.task, pipeline.task)?;
+    same_task(path, &made, pipeline)?;
     let network = make(&tensors, &with_layout(description)).map_err(|why| Error::input(path, why))?;
     same_layout(path, &made, layout(&network), pipeline)?;
     Ok((network, made, content))

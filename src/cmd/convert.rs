@@ -95,7 +95,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome> {
     let provenance = args.settings.provenance(Stage::Convert, &pipeline, &[("recordings", content)])?;
     dataset::write_split(
         &out,
-        (&pipeline.robot, pipeline.task),
+        (&pipeline.robot, &pipeline.task),
         &pick(&train),
         &pick(&validation),
         &provenance,
@@ -120,7 +120,7 @@ impl Room {
 /// The hash of a recording's bytes, and what is kept of it; a failed episode is dropped.
 fn find(path: &Path, pipeline: &Pipeline, room: &Room) -> Result<(ContentHash, dropped::Kept<Found>)> {
     let (episode, made, hash) = recording::read_hashed(path)?;
-    same_task(path, episode.scene.task, pipeline.task)?;
+    same_task(path, &made, pipeline)?;
     same_robot(path, &made, pipeline)?;
     let number = path.file_name().and_then(|name| recording::number_of(name.to_str()?)).unwrap_or(episode.index);
     if let Some(class) = episode.failure.filter(|_| !pipeline.convert.keep_failed) {

@@ -83,17 +83,17 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome> {
         None => run_all(&rollouts, &subject, context, |_| Ok(()))?,
         Some(dir) => record_all(dir, &rollouts, &subject, context, &provenance)?,
     };
-    let summary = Summary::of(pipeline.task, &trials);
+    let summary = Summary::of(&pipeline.task, &trials);
     let stated = Stated::new(&summary, &foreign);
     if let (Some(out), Some(log)) = (&args.out, log) {
         let value = serde_json::to_value(&stated).map_err(|e| Error::Failed(format!("cannot write JSON: {e}")))?;
-        let table = table_file::encode(&log, &to_table(pipeline.task, &trials), &provenance)?;
+        let table = table_file::encode(&log, &to_table(&pipeline.task, &trials), &provenance)?;
         atomic::write_all(&[(log, table), (out.clone(), json_file::encode(out, &value, &provenance)?)])?;
     }
     if args.json {
         output::print_json(&stated)?
     } else {
-        output::print(&words(&summary, &trials))?
+        output::print(&words(&pipeline.task.condition_names(), &summary, &trials))?
     }
     Ok(Outcome::Done)
 }
@@ -163,7 +163,8 @@ impl Subject {
         match self {
             Subject::Planner => {
                 let mut rng = seed::stream(rollouts.seed, "evaluate.search", index);
-                let mut planner = Planner::new(&rollouts.pipeline.robot, &rollouts.pipeline.plan).with_interrupt(interrupt);
+                let mut planner = Planner::new(&rollouts.pipeline.robot, &rollouts.pipeline.task, &rollouts.pipeline.plan);
+                planner = planner.with_interrupt(interrupt);
                 let plan = planner.plan(index, scene, &mut rng).ok()?;
                 Some(Box::new(Follower::new(&plan)?))
             }
@@ -212,13 +213,13 @@ fn record_all(
     Ok(trials)
 }
 
-/// The table for people.
-fn words(summary: &Summary, trials: &[Trial]) -> String {
+/// The table for people; `conditions` in the order of the task.
+fn words(conditions: &[String], summary: &Summary, trials: &[Trial]) -> String {
     let share = |n: u64| format!("{:.1} %", 100.0 * n as f64 / summary.episodes.max(1) as f64);
     let row = |name: &str, n: u64| vec![name.to_string(), n.to_string(), share(n)];
     let [low, high] = summary.wilson_95.map(|v| 100.0 * v);
     let mut rows = vec![row("success", summary.successes)];
-    rows.extend(summary.task.condition_names().iter().map(|name| row(&format!("  {name}"), summary.conditions[*name])));
+    rows.extend(conditions.iter().map(|name| row(&format!("  {name}"), summary.conditions[name])));
     rows.push(row("failed", summary.episodes - summary.successes));
     rows.extend(summary.failures.iter().filter(|(_, n)| **n > 0).map(|(class, n)| row(&format!("  {class}"), *n)));
     if trials.iter().any(|t| !t.scene.obstacles.is_empty()) {

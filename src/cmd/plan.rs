@@ -95,7 +95,10 @@ impl PlanStage<'_> {
         let begun = Mutex::new(BTreeMap::<Block, Planned>::new());
         let episodes = missing.iter().flat_map(|block| block.episodes().map(|episode| (*block, episode)));
         episodes.par_bridge().try_for_each_init(
-            || Planner::new(&self.pipeline.robot, &self.pipeline.plan).with_interrupt(&self.context.interrupt),
+            || {
+                Planner::new(&self.pipeline.robot, &self.pipeline.task, &self.pipeline.plan)
+                    .with_interrupt(&self.context.interrupt)
+            },
             |planner, (block, episode)| {
                 let planned = self.plan_one(planner, episode)?;
                 progress.step();
@@ -115,7 +118,7 @@ impl PlanStage<'_> {
     fn plan_one(&self, planner: &mut Planner, episode: u64) -> Result<dropped::Kept<Plan>> {
         self.context.interrupt.check()?;
         let mut rng = seed::stream(self.seed, "plan.scene", episode);
-        let scene = draw_scene(&self.pipeline.robot, self.pipeline.task, &self.pipeline.scene, &mut rng)?;
+        let scene = draw_scene(&self.pipeline.robot, &self.pipeline.task, &self.pipeline.scene, &mut rng)?;
         let plan = planner.plan(episode, &scene, &mut seed::stream(self.seed, "plan.search", episode));
         self.context.interrupt.check()?;
         Ok(plan.map_err(|e| format!("episode {episode}: {e}")))
@@ -148,7 +151,7 @@ impl PlanStage<'_> {
         if origin != *self.provenance {
             return Err(Error::input(&path, "is a piece of another run; remove it"));
         }
-        block_from_table(&self.pipeline.robot, block, table).map_err(|why| Error::input(&path, why))
+        block_from_table((&self.pipeline.robot, &self.pipeline.task), block, table).map_err(|why| Error::input(&path, why))
     }
 
     /// Writes the plans of all blocks, a block a row group; returns why episodes were dropped.

@@ -1,4 +1,4 @@
-use super::common::{SettingsArgs, path_or, same_layout};
+use super::common::{SettingsArgs, path_or, same_layout, same_task};
 use super::epochs::Epochs;
 use super::places::{Content, beside};
 use super::{Context, Outcome, dropped, output};
@@ -73,7 +73,7 @@ fn reexecute(demos: &[Demo], pipeline: &Pipeline, seed: u64, context: &Context) 
         let rng = seed::stream(seed, "pretrain.reexecute", index);
         let episode = sim::reexecute(
             index,
-            (&pipeline.robot, pipeline.task, demo),
+            (&pipeline.robot, &pipeline.task, demo),
             &pipeline.scene,
             &settings,
             &pipeline.pretrain.reexecute_fingers,
@@ -110,7 +110,8 @@ pub struct Demos {
 pub fn demos(dir: &Path, pipeline: &Pipeline) -> Result<Demos> {
     let mut files = BTreeMap::new();
     let mut read = |name: &str| -> Result<Vec<Demo>> {
-        let found = dataset::read_for(&dir.join(name), pipeline.task)?;
+        let found = dataset::read_for(&dir.join(name), &pipeline.task.name)?;
+        same_task(&dir.join(name), &found.provenance, pipeline)?;
         same_layout(&dir.join(name), &found.provenance, &found.layout, pipeline)?;
         files.extend(found.files.into_iter().map(|(file, hash)| (format!("{name}/{file}"), hash)));
         Ok(found.demos)

@@ -3,19 +3,17 @@ use super::places::Content;
 use super::shard::Shard;
 use super::unfinished::{self, Unfinished};
 use super::{Context, Outcome};
-use crate::config::{SimulateSettings, Stage};
+use crate::config::{Pipeline, SimulateSettings, Stage};
 use crate::data::{Provenance, atomic, recording, table_file};
 use crate::demo::Episode;
 use crate::error::{Error, Result};
 use crate::plan::{Plan, Plans};
-use crate::robot::Robot;
 use crate::seed;
 use crate::sim::{Disturbance, Follower, run_episode};
 use crate::task::FailureClass;
 use rayon::prelude::*;
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 /// Execute plans in contact physics, with noise on every command, and record each episode as an MCAP file. Stopped, the same command goes on.
@@ -45,9 +43,9 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome> {
     let places = args.settings.places().read(&path).write("--out", &out, Content::Recordings("simulate"));
     places.write("the directory of what is unfinished", &kept, Content::Pieces).check(&context.console)?;
     let plans = table_file::Reader::open(&path)?;
-    same_task(&path, plans.provenance().task, pipeline.task)?;
+    same_task(&path, plans.provenance(), &pipeline)?;
     same_robot(&path, plans.provenance(), &pipeline)?;
-    let mut numbers = check_plans(&path, &pipeline.robot, &plans, context)?;
+    let mut numbers = check_plans(&path, &pipeline, &plans, context)?;
     numbers.truncate(args.episodes.map_or(usize::MAX, |n| n as usize));
     let provenance = args.settings.provenance(Stage::Simulate, &pipeline, &[("plans", plans.content())])?;
 
@@ -62,12 +60,14 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome> {
         context,
         totals: Totals::default(),
     };
-    let done = stage.simulate(&share, Plans::new(&path, &pipeline.robot, plans.tables()?)).and_then(|()| match args.shard {
-        Some(shard) => {
-            work.say_shared(shard);
-            Ok(false)
+    let done = stage.simulate(&share, Plans::new(&path, (&pipeline.robot, &pipeline.task), plans.tables()?)).and_then(|()| {
+        match args.shard {
+            Some(shard) => {
+                work.say_shared(shard);
+                Ok(false)
+            }
+            None => stage.put_together(&out, &numbers).map(|()| true),
         }
-        None => stage.put_together(&out, &numbers).map(|()| true),
     });
     match done {
         Ok(true) => {
@@ -81,13 +81,13 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome> {
 }
 
 /// Reads all plans before the work begins, so that what cannot be executed is known then; returns their numbers.
-fn check_plans(path: &Path, robot: &Arc<Robot>, plans: &table_file::Reader, context: &Context) -> Result<Vec<u64>> {
+fn check_plans(path: &Path, of: &Pipeline, plans: &table_file::Reader, context: &Context) -> Result<Vec<u64>> {
     let number = |plan: Result<Plan>| {
         context.interrupt.check()?;
         let plan = plan?;
         follower(path, &plan).map(|_| plan.index)
     };
-    let numbers = Plans::new(path, robot, plans.tables()?).map(number).collect::<Result<Vec<_>>>()?;
+    let numbers = Plans::new(path, (&of.robot, &of.task), plans.tables()?).map(number).collect::<Result<Vec<_>>>()?;
     if numbers.is_empty() {
         return Err(Error::input(path, "holds no plan; run `hilt plan` again"));
     }

@@ -2,10 +2,10 @@
 
 use super::ranges::MOST_OBSTACLES;
 use super::ranges::{RANGES, Range};
-use super::{Pipeline, SceneSettings, Spread};
+use super::{Pipeline, SceneSettings};
 use crate::error::{Error, Result};
 use crate::scene::Obstacle;
-use crate::task::Task;
+use crate::task::{Spread, built_in};
 use crate::words::{did_you_mean, distance, near, shown};
 use toml::{Table, Value};
 
@@ -19,7 +19,8 @@ pub(super) fn resolve(table: Table, origin: &str) -> Result<Pipeline> {
     unknown_keys(&table, origin)?;
     let pipeline: Pipeline = serde_path_to_error::deserialize(Value::Table(table.clone())).map_err(|e| {
         let key = plain_key(&e.path().to_string());
-        let value = find(&table, &key).map_or(String::new(), |v| format!(" = {}", shown(&v.to_string())));
+        let value =
+            find(&table, &key).filter(|v| !v.is_table()).map_or(String::new(), |v| format!(" = {}", shown(&v.to_string())));
         let allowed = Range::of(&key).map_or(String::new(), |r| format!("; allowed: {r}"));
         let reason = e.inner().to_string();
         let reason = reason.lines().next().unwrap_or_default();
@@ -75,7 +76,8 @@ fn ordered(key: &str, [low, high]: [f64; 2], origin: &str) -> Result<()> {
 
 fn unknown_keys(table: &Table, origin: &str) -> Result<()> {
     let known = known_keys();
-    for (key, _) in leaves(table) {
+    // What a task says is checked where it is read.
+    for (key, _) in leaves(table).into_iter().filter(|(key, _)| !key.starts_with("task.")) {
         if !known.contains(&key) && !known.iter().any(|k| k.starts_with(&format!("{key}."))) {
             let (key, hint) = (shown(&key), hint(&key));
             return Err(Error::Usage(format!("{origin}: unknown key {key}{hint} (`hilt settings` prints all keys)")));
@@ -140,7 +142,7 @@ fn known_sections() -> Vec<String> {
 }
 
 pub(super) fn example() -> Table {
-    let mut pipeline = Pipeline::defaults(Task::PickUp);
+    let mut pipeline = Pipeline::defaults(&built_in::pick_up());
     pipeline.scene.obstacles = vec![Obstacle { center_m: [0.0; 3], size_m: [1.0; 3] }];
     pipeline.to_table().expect("default settings have a form in TOML")
 }

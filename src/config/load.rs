@@ -2,10 +2,9 @@
 
 use super::ranges::Range;
 use super::robot::is_file;
-use super::{Pipeline, Preset, check};
+use super::{ChosenTask, Pipeline, Preset, check};
 use crate::error::{Error, Result};
 use crate::interrupt;
-use crate::task::Task;
 use crate::words::shown;
 use std::fs::File;
 use std::io::Read;
@@ -15,16 +14,18 @@ use std::path::{Path, PathBuf};
 const LONGEST_FILE: u64 = 1 << 20;
 /// The key outside of all sections that may be overridden.
 const ROBOT: &str = "robot";
+/// The key of the task.
+const TASK: &str = "task";
 /// Parts of a dotted key: stage, sections, key.
 const MOST_PARTS: usize = 4;
 
 /// Where settings come from before `--set` and flags.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Source {
-    /// A preset that comes with hilt.
-    BuiltIn(Task, Preset),
+    /// A preset that comes with hilt, for a task.
+    BuiltIn(ChosenTask, Preset),
     /// A pipeline file; its task must be the given one, if one is given.
-    File(PathBuf, Option<Task>),
+    File(PathBuf, Option<ChosenTask>),
 }
 
 impl Pipeline {
@@ -34,17 +35,16 @@ impl Pipeline {
     /// [`Error::Usage`] names an unknown key and the nearest known one, or a key, its value and what is allowed;
     /// [`Error::Io`] when the file cannot be read.
     pub fn load(source: &Source, sets: &[String]) -> Result<Pipeline> {
-        let (origin, text, task) = match source {
+        let (origin, mut own, task) = match source {
             Source::BuiltIn(task, preset) => {
-                (format!("built-in pipeline {task} ({})", preset.name()), preset.text(*task).to_string(), Some(*task))
+                let origin = format!("built-in pipeline {} ({})", task.name, preset.name());
+                let mut own = parsed(preset.text(&task.name), &origin)?;
+                own.remove(TASK);
+                (origin, own, Some(task))
             }
-            Source::File(path, task) => (path.display().to_string(), read(path)?, *task),
+            Source::File(path, task) => (path.display().to_string(), read_table(path)?, task.as_ref()),
         };
-        let mut own = parsed(&text, &origin)?;
         agree_on_task(&mut own, task, &origin)?;
-        if let Source::File(path, _) = source {
-            beside(path, &mut own);
-        }
         let mut table = extended(own, &origin)?;
         let mut pipeline = check::resolve(table.clone(), &origin)?;
         for set in sets {
@@ -56,12 +56,16 @@ impl Pipeline {
     }
 }
 
-/// A robot's file is named relative to the pipeline file that names it.
-fn beside(pipeline: &Path, own: &mut toml::Table) {
-    let said = own.get(ROBOT).and_then(toml::Value::as_str).filter(|said| is_file(said));
-    if let Some(file) = said.map(|said| pipeline.parent().unwrap_or(Path::new("")).join(said)) {
-        own.insert(ROBOT.into(), file.display().to_string().into());
+/// The table in a pipeline file. The files of a robot and of a task are named relative to the one that names them.
+pub(super) fn read_table(path: &Path) -> Result<toml::Table> {
+    let mut own = parsed(&read(path)?, &path.display().to_string())?;
+    for key in [ROBOT, TASK] {
+        let said = own.get(key).and_then(toml::Value::as_str).filter(|said| is_file(said));
+        if let Some(file) = said.map(|said| path.parent().unwrap_or(Path::new("")).join(said)) {
+            own.insert(key.into(), file.display().to_string().into());
+        }
     }
+    Ok(own)
 }
 
 fn parsed(text: &str, origin: &str) -> Result<toml::Table> {
@@ -79,10 +83,13 @@ fn extended(mut own: toml::Table, origin: &str) -> Result<toml::Table> {
     let refuse = |why: String| Error::Usage(format!("{origin}: extends: {why}"));
     let name = name.as_str().ok_or_else(|| refuse(format!("{} is no preset's name in quotes", shown(&name.to_string()))))?;
     let preset: Preset = name.parse().map_err(refuse)?;
-    let Some(task) = own.get("task").and_then(toml::Value::as_str).and_then(|task| task.parse().ok()) else {
+    let Some(task) = name_of(&own) else {
         return Ok(own); // what is wrong with the task is said where the settings are checked
     };
-    let mut table = extended(parsed(preset.text(task), preset.name())?, preset.name())?;
+    let mut of_preset = parsed(preset.text(&task), preset.name())?;
+    of_preset.entry(TASK).or_insert_with(|| task.into());
+    let mut table = extended(of_preset, preset.name())?;
+    table.remove(TASK);
     lay_over(&mut table, own);
     Ok(table)
 }
@@ -113,20 +120,33 @@ fn read(path: &Path) -> Result<String> {
     String::from_utf8(bytes).map_err(|_| refuse("it is not UTF-8 text".into()))
 }
 
+/// The name of the task that a table says.
+fn name_of(table: &toml::Table) -> Option<String> {
+    match table.get(TASK)? {
+        toml::Value::String(said) if is_file(said) => ChosenTask::read(said).ok().map(|task| task.name.clone()),
+        toml::Value::String(name) => Some(name.clone()),
+        said => said.get("name")?.as_str().map(String::from),
+    }
+}
+
 /// The file's task and the asked one must be the same; either may be missing, not both.
-fn agree_on_task(table: &mut toml::Table, asked: Option<Task>, origin: &str) -> Result<()> {
-    match (table.get("task").and_then(toml::Value::as_str), asked) {
-        (None, None) if !table.contains_key("task") => {
-            Err(Error::Usage(format!("{origin} names no task: add task = \"pick-up\" to its top, or give --task")))
-        }
-        (Some(named), Some(asked)) if named != asked.name() => Err(Error::Usage(format!(
-            "{origin} is for task {named}, but --task {asked} is asked for: give only one, or the same"
-        ))),
-        (None, Some(asked)) if !table.contains_key("task") => {
-            table.insert("task".into(), asked.name().into());
+fn agree_on_task(table: &mut toml::Table, asked: Option<&ChosenTask>, origin: &str) -> Result<()> {
+    match (table.contains_key(TASK), asked) {
+        (false, None) => Err(Error::Usage(format!("{origin} names no task: add task = \"pick-up\" to its top, or give --task"))),
+        (false, Some(asked)) => {
+            let said = toml::Value::try_from(asked).map_err(|e| Error::Usage(format!("{origin}: the task: {e}")))?;
+            table.insert(TASK.into(), said);
             Ok(())
         }
-        _ => Ok(()),
+        (true, Some(asked)) => match name_of(table) {
+            Some(named) if named != asked.name => Err(Error::Usage(format!(
+                "{origin} is for task {}, but --task {} is asked for: give only one, or the same",
+                shown(&named),
+                asked.name
+            ))),
+            _ => Ok(()),
+        },
+        (true, None) => Ok(()),
     }
 }
 

@@ -14,6 +14,7 @@ mod ranges;
 mod robot;
 mod sc;
 mod scene;
+mod task;
 mod train;
 
 pub use bc_rl::BcRlSettings;
@@ -26,9 +27,10 @@ pub use ppo::{PpoSettings, RewardKind};
 pub use preset::Preset;
 pub use pretrain::PretrainSettings;
 pub use ranges::{MOST_LAYERS, MOST_STEPS, MOST_UNITS};
-pub use robot::ChosenRobot;
+pub use robot::{ChosenRobot, is_file};
 pub use sc::ScSettings;
-pub use scene::{FingerPulses, PlanSettings, PulseSettings, SceneSettings, SimulateSettings, Spread, check_scene};
+pub use scene::{FingerPulses, PlanSettings, PulseSettings, SceneSettings, SimulateSettings, check_scene};
+pub use task::ChosenTask;
 pub use train::TrainSettings;
 
 use crate::error::{Error, Result};
@@ -36,13 +38,14 @@ use crate::task::Task;
 use crate::words::unknown;
 use serde::{Deserialize, Serialize};
 use std::str::FromStr;
+use std::sync::Arc;
 
 /// Every setting of every stage for one task: what a pipeline file holds.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Pipeline {
-    /// The task.
-    pub task: Task,
+    /// The task: the name of one that comes with hilt, the TOML file of another, or `[task]` itself.
+    pub task: ChosenTask,
     /// Who does it: `jaco`, `panda`, `ur5e`, or the TOML file of a robot, relative to the pipeline file.
     #[serde(default)]
     pub robot: ChosenRobot,
@@ -118,9 +121,9 @@ impl FromStr for Stage {
 
 impl Pipeline {
     /// Every setting of `task` at its default.
-    pub fn defaults(task: Task) -> Self {
+    pub fn defaults(task: &Arc<Task>) -> Self {
         Pipeline {
-            task,
+            task: Arc::clone(task).into(),
             robot: ChosenRobot::default(),
             scene: SceneSettings::default(),
             plan: PlanSettings::default(),
@@ -146,7 +149,7 @@ impl Pipeline {
     }
 
     /// The settings that `stage` reads, as they go into the provenance of what it writes; the robot by what it is, not by what its files are called, and the
-    /// paper's not at all, as in files from when there was no other.
+    /// paper's not at all, as in files from when there was no other; so the task.
     ///
     /// # Errors
     /// [`Error::Failed`] when a value has no form in JSON.
@@ -154,9 +157,15 @@ impl Pipeline {
         let mut table = self.to_table()?;
         table.retain(|key, _| stage.sections().contains(&key));
         table.remove("robot");
+        let mut say = |key: &str, [name, content]: [String; 2]| {
+            let said = [("name", name), ("content", content)].map(|(key, value)| (key.into(), value.into()));
+            table.insert(key.into(), toml::Table::from_iter(said).into());
+        };
         if !self.robot.is_default() {
-            let robot = [("name", self.robot.name.clone()), ("content", self.robot.content())];
-            table.insert("robot".into(), toml::Table::from_iter(robot.map(|(key, value)| (key.into(), value.into()))).into());
+            say("robot", [self.robot.name.clone(), self.robot.content()]);
+        }
+        if !self.task.is_of_the_paper() {
+            say("task", [self.task.name.clone(), self.task.content()]);
         }
         serde_json::to_value(table).map_err(|e| Error::Failed(format!("settings cannot be written as JSON: {e}")))
     }

@@ -1,6 +1,6 @@
 //! The presets: pipeline files that the binary carries, so that it works from any directory.
 
-use crate::task::Task;
+use crate::task::built_in;
 use crate::words::unknown;
 use std::str::FromStr;
 
@@ -25,16 +25,15 @@ impl Preset {
         ["best", "mended", "paper"][self as usize]
     }
 
-    /// Its pipeline file for a task.
-    pub(super) fn text(self, task: Task) -> &'static str {
+    /// Its pipeline file for a task. Of one that does not come with hilt, `best` is every setting at its default; of one that is not the paper's,
+    /// `paper` is what the paper did for stacking.
+    pub(super) fn text(self, task: &str) -> &'static str {
         match (self, task) {
-            (Preset::Best, Task::PickUp) => include_str!("../../pipelines/pick-up.toml"),
-            (Preset::Best, Task::PickAndPlace) => include_str!("../../pipelines/pick-and-place.toml"),
-            (Preset::Best, Task::Stack) => include_str!("../../pipelines/stack.toml"),
+            (Preset::Best, task) => built_in::pipeline_text(task).unwrap_or_default(),
             (Preset::Mended, _) => include_str!("../../pipelines/mended.toml"),
-            (Preset::Paper, Task::PickUp) => include_str!("../../pipelines/paper/pick-up.toml"),
-            (Preset::Paper, Task::PickAndPlace) => include_str!("../../pipelines/paper/pick-and-place.toml"),
-            (Preset::Paper, Task::Stack) => include_str!("../../pipelines/paper/stack.toml"),
+            (Preset::Paper, "pick-up") => include_str!("../../pipelines/paper/pick-up.toml"),
+            (Preset::Paper, "pick-and-place") => include_str!("../../pipelines/paper/pick-and-place.toml"),
+            (Preset::Paper, _) => include_str!("../../pipelines/paper/stack.toml"),
         }
     }
 }

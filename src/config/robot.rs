@@ -9,7 +9,7 @@ use std::sync::Arc;
 
 /// The paper's arm.
 const DEFAULT: &str = "jaco";
-/// Ending of a robot's file; what does not end so is a name.
+/// Ending of the file of a robot or a task; what does not end so is a name.
 const ENDING: &str = "toml";
 
 /// `robot = "NAME"` or `robot = "path/to/FILE.toml"`, read.
@@ -50,7 +50,7 @@ impl ChosenRobot {
     }
 }
 
-/// Whether a robot's name is that of a file.
+/// Whether the name of a robot or a task is that of a file.
 pub fn is_file(said: &str) -> bool {
     Path::new(said).extension().is_some_and(|ending| ending == ENDING)
 }

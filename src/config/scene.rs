@@ -3,33 +3,12 @@
 use super::ranges::MOST_OBSTACLES;
 use super::ranges::Range;
 use crate::scene::{Obstacle, Scene};
-use crate::state::{Context, Pose};
-use crate::task::Task;
-use rand::{Rng, RngExt};
+use crate::state::Pose;
+use crate::task::Spread;
 use serde::{Deserialize, Serialize};
 use toml::Value;
 
-/// A number of the scene: fixed, or drawn anew for every episode.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(untagged, expecting = "expected a number, or a range to draw from: [low, high]")]
-pub enum Spread {
-    /// The same in every episode.
-    Fixed(f64),
-    /// Uniform between low and high.
-    Between([f64; 2]),
-}
-
-impl Spread {
-    /// The value of one episode. A fixed one takes nothing from `rng`.
-    pub fn draw(self, rng: &mut impl Rng) -> f64 {
-        match self {
-            Spread::Fixed(value) => value,
-            Spread::Between([low, high]) => low + (high - low) * rng.random::<f64>(),
-        }
-    }
-}
-
-/// `[scene]`: what stands where, used by `plan`, `simulate` and `evaluate`.
+/// `[scene]`: areas that tasks refer to, and what is the same for all objects; used by `plan`, `simulate` and `evaluate`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct SceneSettings {
@@ -37,19 +16,19 @@ pub struct SceneSettings {
     pub spawn_x_m: [f64; 2],
     /// Spawn area along y, low and high \[m\].
     pub spawn_y_m: [f64; 2],
-    /// Goal area of pick-and-place along x, low and high \[m\].
+    /// Goal area (pick-and-place) along x, low and high \[m\].
     pub goal_x_m: [f64; 2],
-    /// Goal area of pick-and-place along y, low and high \[m\].
+    /// Goal area (pick-and-place) along y, low and high \[m\].
     pub goal_y_m: [f64; 2],
-    /// Whether the block's yaw is random (within a quarter turn) instead of 0.
+    /// Whether the yaw of what stands in the spawn area is random (within a quarter turn) instead of 0.
     pub yaw: bool,
     /// Where the base block of the stack task stands, x y \[m\], each a number or a range: within reach, and far enough from the
     /// spawn area that the open hand fits between: from 0.27 m on it had to grasp some blocks from another side, which no small
     /// policy learns well.
     pub base_xy_m: [Spread; 2],
-    /// Coulomb friction of the block against everything, a number or a range.
+    /// Coulomb friction of the objects against everything, a number or a range.
     pub friction: Spread,
-    /// Mass of the block \[kg\], a number or a range.
+    /// Mass of an object \[kg\], a number or a range.
     pub block_mass_kg: Spread,
     /// Fixed boxes to keep clear of (`[[scene.obstacles]]`).
     pub obstacles: Vec<Obstacle>,
@@ -74,7 +53,7 @@ impl Default for SceneSettings {
 /// How far the length of a quaternion may be from 1: what rounding leaves is far less.
 const UNIT: f64 = 1e-3;
 
-/// Whether a scene from a file can be one: every number within what settings allow, turned by unit quaternions, with its task's context.
+/// Whether a scene from a file can be one: every number within what settings allow, turned by unit quaternions, with its task's objects and goals.
 ///
 /// # Errors
 /// Says which number is none, and what is allowed.
@@ -93,16 +72,18 @@ pub fn check_scene(scene: &Scene) -> Result<(), String> {
             Err(format!("the quaternion of {name} has length {length}, allowed: 1"))
         }
     };
-    number("scene.friction", scene.friction)?;
-    number("scene.block_mass_kg", scene.block_mass_kg)?;
-    pose("block", &scene.block)?;
-    match (scene.task, &scene.context) {
-        (Task::PickUp, Context::None) => {}
-        (Task::PickAndPlace, Context::Goal(goal)) => {
-            point("scene.obstacles.center_m", *goal).map_err(|why| why.replace("scene.obstacles.center_m", "goal"))?
-        }
-        (Task::Stack, Context::Base(base)) => pose("base", base)?,
-        (task, _) => return Err(format!("its goal or base block is not that of {task}")),
+    let task = &scene.task;
+    let counts = [(scene.objects.len(), task.objects.len(), "objects"), (scene.goals.len(), task.goal_names().len(), "goals")];
+    if let Some((found, expected, what)) = counts.into_iter().find(|(found, expected, _)| found != expected) {
+        return Err(format!("it has {found} {what}, {task} has {expected}"));
+    }
+    for (object, placed) in task.objects.iter().zip(&scene.objects) {
+        number("scene.friction", placed.friction)?;
+        number("scene.block_mass_kg", placed.mass_kg)?;
+        pose(&object.name, &placed.pose)?;
+    }
+    for (name, goal) in task.goal_names().iter().zip(&scene.goals) {
+        point("scene.obstacles.center_m", *goal).map_err(|why| why.replace("scene.obstacles.center_m", name))?;
     }
     if scene.obstacles.len() > MOST_OBSTACLES {
         return Err(format!("it has {} obstacles, allowed: up to {MOST_OBSTACLES}", scene.obstacles.len()));

@@ -62,12 +62,11 @@ fn flatten(name: &str, value: &Value, out: &mut Vec<(String, Value)>) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::task::Task;
     use serde_json::json;
 
     #[test]
     fn the_first_difference_has_its_key_and_both_values() {
-        let one = Provenance::new("train", Task::Stack, json!({"method": "hil", "train": {"rho": 0.3, "tau": 0.5}}), 1);
+        let one = Provenance::new("train", "stack", json!({"method": "hil", "train": {"rho": 0.3, "tau": 0.5}}), 1);
         let difference = |change: fn(&mut Provenance)| {
             let mut other = one.clone();
             change(&mut other);

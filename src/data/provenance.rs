@@ -3,13 +3,17 @@
 use super::content_hash::ContentHash;
 use super::seal::{self, SCHEMA_VERSION};
 use crate::error::{Error, Result};
-use crate::task::Task;
-use serde::{Deserialize, Serialize};
+use crate::words::shown;
+use serde::de::Error as _;
+use serde::{Deserialize, Deserializer, Serialize};
 use std::collections::BTreeMap;
 use std::path::Path;
 
 /// The metadata key of every format that holds the provenance.
 pub const KEY: &str = "hilt";
+
+/// Most characters of a task's name.
+const LONGEST_NAME: usize = 64;
 
 /// What made an artefact, out of what.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -21,8 +25,9 @@ pub struct Provenance {
     pub schema_version: u32,
     /// The stage: "plan", "simulate", ...
     pub stage: String,
-    /// The task.
-    pub task: Task,
+    /// The task's name.
+    #[serde(deserialize_with = "task_name")]
+    pub task: String,
     /// The stage's settings after defaults, file and flags.
     pub settings: serde_json::Value,
     /// The run's seed.
@@ -33,12 +38,12 @@ pub struct Provenance {
 
 impl Provenance {
     /// Of this version of hilt, without inputs.
-    pub fn new(stage: &str, task: Task, settings: serde_json::Value, seed: u64) -> Self {
+    pub fn new(stage: &str, task: &str, settings: serde_json::Value, seed: u64) -> Self {
         Provenance {
             hilt_version: env!("CARGO_PKG_VERSION").into(),
             schema_version: SCHEMA_VERSION,
             stage: stage.into(),
-            task,
+            task: task.into(),
             settings,
             seed,
             inputs: BTreeMap::new(),
@@ -73,6 +78,36 @@ impl Provenance {
         match value.get("schema_version").and_then(serde_json::Value::as_u64) {
             Some(version) if version != u64::from(SCHEMA_VERSION) => Err(seal::wrong_version(path, version)),
             _ => serde_json::from_value(value).map_err(|e| Error::input(path, format!("its provenance cannot be read: {e}"))),
+        }
+    }
+}
+
+/// What can be the name of a task, also of one that is not there any more.
+fn task_name<'de, D: Deserializer<'de>>(deserializer: D) -> std::result::Result<String, D::Error> {
+    let name = String::deserialize(deserializer)?;
+    let letters = name.bytes().all(|b| b.is_ascii_lowercase() || b.is_ascii_digit() || b"-_".contains(&b));
+    if letters && (1..=LONGEST_NAME).contains(&name.len()) {
+        return Ok(name);
+    }
+    let name = shown(&name);
+    Err(D::Error::custom(format!("{name:?} is no name of a task: 1 to {LONGEST_NAME} small letters, digits, - and _")))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use serde_json::json;
+
+    #[test]
+    fn a_task_may_have_any_name_that_is_one() {
+        let of = |task: &str| Provenance::new("plan", task, json!({}), 0);
+        let read = |task: &str| Provenance::from_json(Path::new("plans.parquet"), &of(task).to_json());
+        for name in ["pick-up", "my_task-2", &"t".repeat(64)] {
+            assert_eq!(read(name).expect("a provenance"), of(name));
+        }
+        for name in ["", "Pick-up", "../stack", "two words", "\u{e4}", "a\nb", &"t".repeat(65)] {
+            let said = read(name).expect_err("refused").to_string();
+            assert!(said.contains("its provenance cannot be read: ") && said.contains("is no name of a task"), "{said}");
         }
     }
 }

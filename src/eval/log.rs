@@ -1,12 +1,12 @@
 //! The per-episode log of an evaluation.
 
 use super::Trial;
-use crate::scene::Scene;
+use crate::scene::Placed;
 use crate::table::{Table, Values};
 use crate::task::Task;
 
 /// One row per episode: where it started, how it ended, which conditions held at its end.
-pub fn to_table(task: Task, trials: &[Trial]) -> Table {
+pub fn to_table(task: &Task, trials: &[Trial]) -> Table {
     let f64s = |pick: &dyn Fn(&Trial) -> f64| Values::F64(trials.iter().map(pick).collect());
     let flags = |pick: &dyn Fn(&Trial) -> bool| Values::Bool(trials.iter().map(pick).collect());
     let i64s = |pick: &dyn Fn(&Trial) -> u64| Values::I64(trials.iter().map(|t| pick(t) as i64).collect());
@@ -21,29 +21,29 @@ pub fn to_table(task: Task, trials: &[Trial]) -> Table {
         .with("failure", "Failure class, empty after a success.", Values::Text(failures))
         .with("steps", "Control steps taken, 50 ms each.", i64s(&|t| t.steps))
         .with("reward", "Sum of the milestones' rewards.", f64s(&|t| t.reward))
-        .with("hit_obstacle", "Whether a robot link touched an obstacle at any moment.", flags(&|t| t.hit_obstacle))
-        .with("block.x_m", "Where the block stood at the start, x.", f64s(&|t| t.scene.block.position_m[0]))
-        .with("block.y_m", "Where the block stood at the start, y.", f64s(&|t| t.scene.block.position_m[1]))
-        .with("block.yaw_rad", "How the block was turned about the vertical at the start.", f64s(&|t| yaw(&t.scene)))
-        .with("friction", "Coulomb friction of the block against everything.", f64s(&|t| t.scene.friction))
-        .with("block.mass_kg", "Mass of the block.", f64s(&|t| t.scene.block_mass_kg));
-    let target = match task {
-        Task::PickUp => None,
-        Task::PickAndPlace => Some(("goal", "The goal")),
-        Task::Stack => Some(("base", "Where the base block stood at the start")),
-    };
-    if let Some((name, doc)) = target {
+        .with("hit_obstacle", "Whether a robot link touched an obstacle at any moment.", flags(&|t| t.hit_obstacle));
+    for (k, object) in task.objects.iter().enumerate() {
+        let name = &object.name;
+        let mut add = |part: &str, doc: &str, of: fn(&Placed) -> f64| {
+            let values = f64s(&|t| of(&t.scene.objects[k]));
+            let whole = std::mem::take(&mut table);
+            table = whole.with(&format!("{name}.{part}"), &format!("{doc} of object {name} at the start."), values);
+        };
+        add("x_m", "Place along x", |o| o.pose.position_m[0]);
+        add("y_m", "Place along y", |o| o.pose.position_m[1]);
+        if k < task.moved() {
+            add("yaw_rad", "Turn about the vertical", |o| o.pose.isometry().rotation.euler_angles().2);
+            add("friction", "Coulomb friction", |o| o.friction);
+            add("mass_kg", "Mass", |o| o.mass_kg);
+        }
+    }
+    for (k, name) in task.goal_names().iter().enumerate() {
         for (i, axis) in ["x", "y"].into_iter().enumerate() {
-            let values = f64s(&|t| t.scene.target_m()[i]);
-            table = table.with(&format!("{name}.{axis}_m"), &format!("{doc}, {axis}."), values);
+            table = table.with(&format!("{name}.{axis}_m"), &format!("The goal, {axis}."), f64s(&|t| t.scene.goals[k][i]));
         }
     }
     for (i, name) in task.condition_names().iter().enumerate() {
         table = table.with(&format!("condition.{name}"), "Whether this condition held at the end.", flags(&|t| t.conditions[i]));
     }
     table
-}
-
-fn yaw(scene: &Scene) -> f64 {
-    scene.block.isometry().rotation.euler_angles().2
 }

@@ -100,7 +100,7 @@ impl<'a> Rollouts<'a> {
     /// # Errors
     /// See [`draw_scene`].
     pub fn scene(&self, index: u64) -> Result<Scene> {
-        draw_scene(&self.pipeline.robot, self.pipeline.task, &self.pipeline.scene, &mut self.stream("scene", index))
+        draw_scene(&self.pipeline.robot, &self.pipeline.task, &self.pipeline.scene, &mut self.stream("scene", index))
     }
 
     /// Runs all episodes, in parallel on the current thread pool; the result does not depend on the number of threads.

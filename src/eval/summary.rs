@@ -29,8 +29,8 @@ impl Percentiles {
 /// The result of an evaluation: `evaluation.json` and `hilt evaluate --json`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Summary {
-    /// The task.
-    pub task: Task,
+    /// The task's name.
+    pub task: String,
     /// Episodes run.
     pub episodes: u64,
     /// Episodes solved.
@@ -49,20 +49,20 @@ pub struct Summary {
 
 impl Summary {
     /// Counts up the trials of one evaluation of `task`.
-    pub fn of(task: Task, trials: &[Trial]) -> Self {
+    pub fn of(task: &Task, trials: &[Trial]) -> Self {
         let episodes = trials.len() as u64;
         let count = |keep: &dyn Fn(&Trial) -> bool| trials.iter().filter(|t| keep(t)).count() as u64;
         let successes = count(&|t| t.success);
         let failures = FailureClass::ALL.map(|class| (class.name().to_string(), count(&|t| t.failure == Some(class))));
-        let conditions = task.condition_names().iter().enumerate();
+        let conditions = task.condition_names().into_iter().enumerate();
         Summary {
-            task,
+            task: task.name.clone(),
             episodes,
             successes,
             success_rate: if episodes == 0 { 0.0 } else { successes as f64 / episodes as f64 },
             wilson_95: wilson_95(successes, episodes),
             failures: failures.into(),
-            conditions: conditions.map(|(i, name)| (name.to_string(), count(&|t| t.conditions[i]))).collect(),
+            conditions: conditions.map(|(i, name)| (name, count(&|t| t.conditions[i]))).collect(),
             episode_steps: Percentiles::of(trials.iter().map(|t| t.steps).collect()),
         }
     }

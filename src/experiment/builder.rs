@@ -11,13 +11,12 @@ use crate::data::Provenance;
 use crate::data::origin::Kind;
 use crate::error::{Error, Result};
 use crate::learn::MethodName;
-use crate::task::Task;
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
 /// A cell of the grid and a seed.
 pub(super) struct At<'a> {
-    pub(super) task: Task,
+    pub(super) task: &'a str,
     pub(super) preset: &'a str,
     pub(super) variation: Option<&'a Variation>,
     pub(super) seed: u64,
@@ -26,7 +25,7 @@ pub(super) struct At<'a> {
 impl At<'_> {
     /// Below the experiment's directory.
     fn dir(&self, varied: bool, method: Option<MethodName>) -> PathBuf {
-        let mut dir = PathBuf::from(self.task.name()).join(format!("seed-{}", self.seed)).join(self.preset);
+        let mut dir = PathBuf::from(self.task).join(format!("seed-{}", self.seed)).join(self.preset);
         if let Some(variation) = self.variation.filter(|_| varied) {
             dir.push(&variation.name);
         }
@@ -80,7 +79,7 @@ impl<'a> Builder<'a> {
         let policy = self.input("policy", train);
         let evaluate = self.step(at, Stage::Evaluate, Some(method), &own, vec![policy], settings)?;
         let variation = at.variation.map_or(String::new(), |v| v.name.clone());
-        Ok(Run { task: at.task, preset: at.preset.into(), variation, method, seed: at.seed, train, evaluate })
+        Ok(Run { task: at.task.into(), preset: at.preset.into(), variation, method, seed: at.seed, train, evaluate })
     }
 
     fn input(&self, role: &'static str, from: usize) -> Input {
@@ -90,7 +89,7 @@ impl<'a> Builder<'a> {
 
     /// A dataset that was there before.
     fn given(&self, path: &str, at: &At) -> Input {
-        let path = path.replace("{task}", at.task.name()).replace("{seed}", &at.seed.to_string());
+        let path = path.replace("{task}", at.task).replace("{seed}", &at.seed.to_string());
         Input { role: "dataset", path: path.into(), kind: Kind::Datasets, from: None }
     }
 
@@ -131,7 +130,7 @@ impl<'a> Builder<'a> {
             log: self.dir.join("logs").join(format!("{id}.log")),
             id,
             stage,
-            task: at.task,
+            task: at.task.into(),
             seed: at.seed,
             method,
             words: line,

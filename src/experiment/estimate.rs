@@ -5,7 +5,6 @@ use super::state::State;
 use super::step::Step;
 use crate::config::{Pipeline, Stage};
 use crate::learn::MethodName;
-use crate::task::Task;
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
@@ -91,7 +90,7 @@ fn seconds_of(log: &Path, what: &str) -> Option<f64> {
 pub struct Estimate {
     threads: f64,
     /// Measured over stated wall time, by stage and task.
-    ratios: BTreeMap<(&'static str, &'static str), f64>,
+    ratios: BTreeMap<(&'static str, String), f64>,
 }
 
 impl Estimate {
@@ -101,7 +100,7 @@ impl Estimate {
         let mut sums = BTreeMap::<_, [f64; 2]>::new();
         for (step, _) in grid.steps.iter().zip(states).filter(|(_, state)| **state == State::Done) {
             if let Some(measured_s) = wall_s_of(&step.log) {
-                let [measured, stated] = sums.entry(key(step.stage, step.task)).or_default();
+                let [measured, stated] = sums.entry(key(step)).or_default();
                 *measured += measured_s;
                 *stated += step.cost_s / threads;
             }
@@ -112,7 +111,7 @@ impl Estimate {
 
     /// Wall time of a step \[s\], and whether it comes from finished ones.
     pub fn of_step(&self, step: &Step) -> (f64, bool) {
-        let ratio = self.ratios.get(&key(step.stage, step.task));
+        let ratio = self.ratios.get(&key(step));
         (step.cost_s / self.threads * ratio.unwrap_or(&1.0), ratio.is_some())
     }
 
@@ -130,8 +129,8 @@ impl Estimate {
     }
 }
 
-fn key(stage: Stage, task: Task) -> (&'static str, &'static str) {
-    (stage.name(), task.name())
+fn key(step: &Step) -> (&'static str, String) {
+    (step.stage.name(), step.task.clone())
 }
 
 /// A time in words: `40 s`, `12 min`, `3.5 h`.

@@ -4,7 +4,7 @@ use super::report_kind::ReportKind;
 use super::seeds::Seeds;
 use super::spec::{Experiment, Overrides};
 use super::variation::{self, Raw as RawVariation};
-use super::wording::{check_keys, check_name, distinct, is_name, not_empty, parsed};
+use super::wording::{check_keys, check_name, distinct, is_name, not_empty, parsed, task_names};
 use crate::config::Preset;
 use crate::error::{Error, Result};
 use crate::words::{shown, unknown};
@@ -132,7 +132,7 @@ fn of_text(name: &str, path: &Path, text: &str, overrides: &Overrides) -> std::r
         notes: raw.notes,
         report: raw.report.map_or(Ok(ReportKind::default()), |word| word.parse())?,
         reference: raw.reference,
-        tasks: parsed(&raw.tasks)?,
+        tasks: task_names(&raw.tasks)?,
         methods: parsed(&raw.methods)?,
         presets,
         seeds,

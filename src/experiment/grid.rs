@@ -26,10 +26,10 @@ impl Grid {
         let mut cells = Vec::new();
         for (t, task) in experiment.tasks.iter().enumerate() {
             for (p, preset) in experiment.presets.iter().enumerate() {
-                let base = cell(experiment, *task, preset, None)?;
+                let base = cell(experiment, task, preset, None)?;
                 for (v, variation) in variations.iter().enumerate() {
                     if variation.is_none_or(|v| v.tasks.contains(task)) {
-                        let settings = cell(experiment, *task, preset, *variation)?;
+                        let settings = cell(experiment, task, preset, *variation)?;
                         cells.push(([t, p, v], settings, base.clone()));
                     }
                 }
@@ -42,7 +42,7 @@ impl Grid {
                 for (m, method) in experiment.methods.iter().enumerate() {
                     if variations[*v].is_none_or(|v| v.methods.contains(method)) {
                         let at = At {
-                            task: experiment.tasks[*t],
+                            task: &experiment.tasks[*t],
                             preset: &experiment.presets[*p],
                             variation: variations[*v],
                             seed: *seed,
@@ -73,7 +73,7 @@ fn check_apart(experiment: &Experiment, runs: &[Run]) -> Result<()> {
     let mut first: HashMap<usize, &Run> = HashMap::new();
     for run in runs {
         if let Some(other) = first.insert(run.evaluate, run) {
-            let (file, task, method) = (experiment.path.display(), run.task, run.method.name());
+            let (file, task, method) = (experiment.path.display(), &run.task, run.method.name());
             let (a, b) = if other.variation == run.variation {
                 (format!("presets \"{}\"", other.preset), format!("\"{}\"", run.preset))
             } else {

@@ -1,11 +1,10 @@
 //! The settings of every stage for one task, preset and variation.
 
 use super::spec::{Experiment, Variation};
-use crate::config::{Pipeline, Preset, Source, Stage};
+use crate::config::{ChosenTask, Pipeline, Preset, Source, Stage};
 use crate::error::{Error, Result};
 use crate::learn::MethodName;
 use crate::plan::check_ready_pose;
-use crate::task::Task;
 use crate::words::{shown, unknown};
 use serde_json::Value;
 use std::collections::BTreeSet;
@@ -75,7 +74,7 @@ pub type Cell = [StageSettings; 6];
 ///
 /// # Errors
 /// [`Error::Usage`] names what is wrong and where.
-pub fn cell(experiment: &Experiment, task: Task, preset: &str, variation: Option<&Variation>) -> Result<Cell> {
+pub fn cell(experiment: &Experiment, task: &str, preset: &str, variation: Option<&Variation>) -> Result<Cell> {
     let at = match variation {
         Some(variation) => format!("{}: variation \"{}\"", experiment.path.display(), variation.name),
         None => experiment.path.display().to_string(),
@@ -117,17 +116,16 @@ fn section_of(set: &str) -> &str {
     set.split(['.', '=']).next().unwrap_or_default().trim()
 }
 
-fn source_of(task: Task, preset: &str) -> std::result::Result<(Source, Vec<String>), String> {
-    let name = task.name().to_string();
+fn source_of(task: &str, preset: &str) -> std::result::Result<(Source, Vec<String>), String> {
     if let Ok(known) = preset.parse::<Preset>() {
-        let words = ["--task".to_string(), name, "--preset".into(), preset.into()];
+        let words = ["--task".to_string(), task.into(), "--preset".into(), preset.into()];
         let words = if known == Preset::default() { words[..2].to_vec() } else { words.to_vec() };
-        return Ok((Source::BuiltIn(task, known), words));
+        return Ok((Source::BuiltIn(ChosenTask::read(task)?, known), words));
     }
     let path = Path::new(PIPELINES).join(preset).join(format!("{task}.toml"));
     if path.is_file() {
-        let words = vec!["--pipeline".into(), path.display().to_string(), "--task".into(), name];
-        return Ok((Source::File(path, Some(task)), words));
+        let words = vec!["--pipeline".into(), path.display().to_string(), "--task".into(), task.into()];
+        return Ok((Source::File(path, Some(ChosenTask::read(task)?)), words));
     }
     let has_file = |dir: &Path| dir.join(format!("{task}.toml")).is_file();
     let entries = fs::read_dir(PIPELINES).into_iter().flatten().flatten();

@@ -72,7 +72,7 @@ pub fn updates(metrics: &Table) -> Option<u64> {
 pub fn to_csv(rows: &[Row], grid: &Grid) -> String {
     let mut text = header();
     for Row { run, summary, updates, .. } in rows {
-        let (task, preset, variation, method, seed) = (run.task, &run.preset, &run.variation, run.method.name(), run.seed);
+        let (task, preset, variation, method, seed) = (&run.task, &run.preset, &run.variation, run.method.name(), run.seed);
         let Summary { episodes, successes, success_rate, wilson_95: [low, high], failures, .. } = summary;
         let classes = FailureClass::ALL.map(|class| failures.get(class.name()).copied().unwrap_or(0).to_string()).join(",");
         let directory = grid.steps[run.evaluate].id.trim_end_matches("/evaluate");

@@ -2,13 +2,12 @@
 
 use super::step::Step;
 use crate::learn::MethodName;
-use crate::task::Task;
 
 /// One policy and its evaluation: a row of the results.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Run {
-    /// The task.
-    pub task: Task,
+    /// The task's name.
+    pub task: String,
     /// The preset.
     pub preset: String,
     /// The variation; empty = the plain settings.

@@ -3,7 +3,6 @@
 use super::report_kind::ReportKind;
 use crate::config::Stage;
 use crate::learn::MethodName;
-use crate::task::Task;
 use std::path::PathBuf;
 
 /// What an experiment's file says, with names in place of words.
@@ -21,8 +20,8 @@ pub struct Experiment {
     pub report: ReportKind,
     /// The variation that a report compares the others with.
     pub reference: Option<String>,
-    /// Tasks.
-    pub tasks: Vec<Task>,
+    /// Names of its tasks.
+    pub tasks: Vec<String>,
     /// Presets: those that come with hilt, or directories below `pipelines` with a file a task.
     pub presets: Vec<String>,
     /// Methods.
@@ -61,8 +60,8 @@ pub struct Variation {
     pub set: Vec<String>,
     /// Stages that they hold for.
     pub stages: Vec<Stage>,
-    /// Tasks that have it.
-    pub tasks: Vec<Task>,
+    /// Names of the tasks that have it.
+    pub tasks: Vec<String>,
     /// Methods that have it.
     pub methods: Vec<MethodName>,
 }

@@ -4,7 +4,6 @@ use crate::config::Stage;
 use crate::data::Provenance;
 use crate::data::origin::Kind;
 use crate::learn::MethodName;
-use crate::task::Task;
 use std::path::{Path, PathBuf};
 
 /// A command line of hilt, what it reads and what it leaves.
@@ -14,8 +13,8 @@ pub struct Step {
     pub id: String,
     /// The stage.
     pub stage: Stage,
-    /// The task.
-    pub task: Task,
+    /// The task's name.
+    pub task: String,
     /// The seed.
     pub seed: u64,
     /// The method, of a training and its evaluation.

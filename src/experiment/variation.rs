@@ -1,7 +1,7 @@
 //! A variation as a file has it, checked.
 
 use super::spec::{Experiment, Variation};
-use super::wording::{check_name, not_empty, parsed};
+use super::wording::{check_name, not_empty, parsed, task_names};
 use crate::config::Stage;
 use crate::learn::MethodName;
 use crate::words::unknown;
@@ -38,7 +38,7 @@ impl Raw {
             return Err("this name is taken by another directory of a run; choose another".into());
         }
         let stages = self.stages.as_ref().map_or(Ok(Stage::ALL.to_vec()), |words| parsed(words))?;
-        let tasks = self.tasks.as_ref().map_or(Ok(of.tasks.clone()), |words| parsed(words))?;
+        let tasks = self.tasks.as_ref().map_or(Ok(of.tasks.clone()), |words| task_names(words))?;
         let methods = self.methods.as_ref().map_or(Ok(of.methods.clone()), |words| parsed(words))?;
         for list in [("stages", stages.len()), ("tasks", tasks.len()), ("methods", methods.len())] {
             not_empty(list)?;

@@ -1,6 +1,7 @@
 //! Words of an experiment's file: names, keys and lists, and what is wrong with them.
 
 use crate::config::Stage;
+use crate::task::built_in;
 use crate::words::{did_you_mean, shown, unknown};
 use std::collections::BTreeSet;
 
@@ -12,6 +13,11 @@ pub(super) const TAKES: &str = "a text takes all that is written to it";
 
 pub(super) fn parsed<T: std::str::FromStr<Err = String>>(words: &[String]) -> std::result::Result<Vec<T>, String> {
     words.iter().map(|word| word.parse()).collect()
+}
+
+/// Names of tasks, each of one that there is.
+pub(super) fn task_names(words: &[String]) -> std::result::Result<Vec<String>, String> {
+    words.iter().map(|word| built_in::find(word).map(|task| task.name.clone())).collect()
 }
 
 pub(super) fn check_keys(table: &toml::Table, known: &[&str]) -> std::result::Result<(), String> {

@@ -3,6 +3,7 @@
 use super::{Plan, from_table, to_table};
 use crate::robot::Robot;
 use crate::table::{Table, Values};
+use crate::task::Task;
 use std::ops::Range;
 use std::sync::Arc;
 
@@ -74,11 +75,11 @@ pub fn block_to_table(robot: &Robot, planned: Planned) -> Table {
     table.with(DROPPED, "Why the episode has no plan, empty on the rows of plans.", Values::Text(dropped))
 }
 
-/// The inverse of [`block_to_table`], of plans of `robot`, by number.
+/// The inverse of [`block_to_table`], of plans of `robot` in `task`, by number.
 ///
 /// # Errors
 /// As [`from_table`]; when the episodes are not those of `block`.
-pub fn block_from_table(robot: &Arc<Robot>, block: Block, mut table: Table) -> Result<Planned, String> {
+pub fn block_from_table((robot, task): (&Arc<Robot>, &Arc<Task>), block: Block, mut table: Table) -> Result<Planned, String> {
     let Some(Values::Text(dropped)) = table.columns.pop().filter(|c| c.name == DROPPED).map(|c| c.values) else {
         return Err(format!("its last column is not {DROPPED}: this is no block of plans"));
     };
@@ -95,7 +96,8 @@ pub fn block_from_table(robot: &Arc<Robot>, block: Block, mut table: Table) -> R
         }
     }
     let drops = numbers.into_iter().map(|number| number as u64).zip(dropped.into_iter().skip(waypoints).map(Err));
-    let mut planned: Planned = from_table(robot, &table)?.into_iter().map(|plan| (plan.index, Ok(plan))).chain(drops).collect();
+    let mut planned: Planned =
+        from_table(robot, task, &table)?.into_iter().map(|plan| (plan.index, Ok(plan))).chain(drops).collect();
     planned.sort_by_key(|(number, _)| *number);
     if planned.iter().map(|(number, _)| *number).eq(block.episodes()) {
         return Ok(planned);

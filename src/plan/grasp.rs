@@ -4,26 +4,24 @@ use super::path::{Knot, YAW_LEVER_M, knot};
 use crate::joints::Joints;
 use crate::robot::Robot;
 use crate::robot::collision::Solid;
-use crate::scene::{BLOCK_EDGE_M, Scene};
-use crate::state::Context;
+use crate::scene::Scene;
+use crate::task::{Object, Target};
 use nalgebra::Translation3;
 use std::f64::consts::FRAC_PI_2;
 
-/// Height of the tool point over the block's centre in a grasp \[m\]: closed fingertips stay 5 mm above the table.
-pub const GRASP_OVER_CENTER_M: f64 = -0.001;
 /// Height over the grasp from which the hand comes straight down \[m\]: open fingertips pass above the block.
 pub(super) const PREGRASP_RISE_M: f64 = 0.09;
-/// Height of the block's centre at the end of a pick-up \[m\]: 3.5 cm above what counts.
-pub const LIFTED_CENTER_M: f64 = 0.235;
-/// Height over grasp and release at which the block is carried \[m\]: its lower face passes 3 cm above a base block.
+/// How far above what counts an object is lifted \[m\].
+const OVER_HEIGHT_M: f64 = 0.035;
+/// Height over grasp and release at which an object is carried \[m\]: the lower face of a 5 cm cube passes 3 cm above another.
 pub(super) const CARRY_RISE_M: f64 = 0.08;
-/// Gap under the block when it is let go \[m\].
+/// Gap under the object when it is let go \[m\].
 pub const RELEASE_GAP_M: f64 = 0.002;
 /// How far the hand retreats upward \[m\].
 pub(super) const RETREAT_RISE_M: f64 = 0.09;
-/// How deep a finger that holds a block is in it, in numbers \[m\]: within the millimetre that contacts of the simulation give way.
+/// How deep a finger that holds an object is in it, in numbers \[m\]: within the millimetre that contacts of the simulation give way.
 const PRESS_M: f64 = 5e-4;
-/// Halvings of the way on which a closing finger meets the block: a hundredth of a degree is left.
+/// Halvings of the way on which a closing finger meets the object: a hundredth of a degree is left.
 const CLOSING_ROUNDS: usize = 14;
 /// Quarter turns at which a cube can be held, in order of preference.
 const QUARTER_TURNS: [f64; 4] = [0.0, 1.0, -1.0, 2.0];
@@ -39,28 +37,34 @@ pub(super) fn ready(robot: &Robot) -> Knot {
     knot(tool.translation.vector.into(), 0.0)
 }
 
-/// Level hand poses around the block, nearest to the ready pose's yaw first.
-pub(super) fn grasps(scene: &Scene) -> Vec<Knot> {
-    let [x, y, z] = scene.block.position_m;
-    let yaw = quarter_turn(scene.block.isometry().rotation.euler_angles().2);
-    QUARTER_TURNS.map(|k| knot([x, y, z + GRASP_OVER_CENTER_M], yaw + k * FRAC_PI_2)).to_vec()
+/// Level hand poses around the object of a goal, nearest to the ready pose's yaw first.
+pub(super) fn grasps(scene: &Scene, goal: usize) -> Vec<Knot> {
+    let number = scene.task.goals[goal].object;
+    let pose = scene.objects[number].pose;
+    let [x, y, z] = pose.position_m;
+    let yaw = quarter_turn(pose.isometry().rotation.euler_angles().2);
+    QUARTER_TURNS.map(|k| knot([x, y, z + scene.task.objects[number].grip_m], yaw + k * FRAC_PI_2)).to_vec()
 }
 
-/// Level hand poses that let a block, held at `grasp`, stand at its target: least turning first.
-pub(super) fn releases(scene: &Scene, grasp: &Knot) -> Vec<Knot> {
-    let aligned = match scene.context {
-        Context::None | Context::Goal(_) => 0.0,
-        Context::Base(base) => {
-            quarter_turn(base.isometry().rotation.euler_angles().2 - scene.block.isometry().rotation.euler_angles().2)
-        }
-    };
-    let [x, y, z] = scene.target_m();
+/// How much higher than in its grasp an object is in the end of a lift \[m\].
+pub(super) fn lift_m(scene: &Scene, goal: usize) -> f64 {
+    let Target::Lift { height_m } = scene.task.goals[goal].target else { return 0.0 };
+    height_m + OVER_HEIGHT_M - scene.objects[scene.task.goals[goal].object].pose.position_m[2]
+}
+
+/// Level hand poses that let the object of a goal, held at `grasp`, stand at its target: least turning first.
+pub(super) fn releases(scene: &Scene, goal: usize, grasp: &Knot) -> Vec<Knot> {
+    let number = scene.task.goals[goal].object;
+    let own = scene.objects[number].pose.isometry().rotation.euler_angles().2;
+    let aligned = quarter_turn(scene.task.goals[goal].kind().yaw_rad(scene, goal) - own);
+    let [x, y, z] = scene.target_m(goal);
     let yaw = grasp.w / YAW_LEVER_M + aligned;
-    QUARTER_TURNS.map(|k| knot([x, y, z + GRASP_OVER_CENTER_M + RELEASE_GAP_M], yaw + k * FRAC_PI_2)).to_vec()
+    let z = z + scene.task.objects[number].grip_m + RELEASE_GAP_M;
+    QUARTER_TURNS.map(|k| knot([x, y, z], yaw + k * FRAC_PI_2)).to_vec()
 }
 
-/// The hand in the ready pose, each finger closed as far as a block between them lets it, to a hundredth of a radian.
-pub(super) fn closed_on_block(robot: &Robot) -> Joints {
+/// The hand in the ready pose, each finger closed as far as an object between them lets it, to a hundredth of a radian.
+pub(super) fn closed_around(robot: &Robot, object: &Object) -> Joints {
     let mut closed = robot.ready;
     for (i, joint) in robot.fingers().enumerate() {
         let at = |share: f64| {
@@ -71,7 +75,7 @@ pub(super) fn closed_on_block(robot: &Robot) -> Joints {
         let (mut low, mut high) = (0.0, 1.0);
         for _ in 0..CLOSING_ROUNDS {
             let share = (low + high) / 2.0;
-            if presses_block(robot, joint + 1, &at(share)) { high = share } else { low = share }
+            if presses(robot, joint + 1, &at(share), object) { high = share } else { low = share }
         }
         let hundredths = at(low)[joint] / robot.joints[joint].per_radian() * 100.0;
         let whole = if robot.closing_way(i) > 0.0 { hundredths.floor() } else { hundredths.ceil() };
@@ -80,12 +84,12 @@ pub(super) fn closed_on_block(robot: &Robot) -> Joints {
     closed
 }
 
-/// Whether a link presses into a block that stands as it is grasped.
-fn presses_block(robot: &Robot, link: usize, q: &Joints) -> bool {
+/// Whether a link presses into an object that stands as it is grasped.
+fn presses(robot: &Robot, link: usize, q: &Joints, object: &Object) -> bool {
     let poses = robot.link_poses(q);
-    let center = robot.tool_of(&poses) * Translation3::new(0.0, 0.0, -GRASP_OVER_CENTER_M);
-    let block = Solid::cuboid(center, [BLOCK_EDGE_M / 2.0; 3]);
-    robot.links[link].shapes.iter().any(|shape| Solid::of(shape, &poses[link]).distance_m(&block) < -PRESS_M)
+    let center = robot.tool_of(&poses) * Translation3::new(0.0, 0.0, -object.grip_m);
+    let solid = Solid::cuboid(center, object.shape.half_m());
+    robot.links[link].shapes.iter().any(|shape| Solid::of(shape, &poses[link]).distance_m(&solid) < -PRESS_M)
 }
 
 /// The least turn that looks the same for a cube, within an eighth of a turn to either side.

@@ -15,7 +15,7 @@ mod transit;
 mod world;
 
 pub use block::{Block, Planned, block_from_table, block_to_table};
-pub use grasp::{GRASP_OVER_CENTER_M, LIFTED_CENTER_M, RELEASE_GAP_M};
+pub use grasp::RELEASE_GAP_M;
 pub use planner::Planner;
 pub use smooth::Limits;
 pub use table::{Plans, from_table, to_table};
@@ -28,6 +28,8 @@ use crate::scene::Scene;
 /// One sample of a plan.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Waypoint {
+    /// Which goal of the task this is for.
+    pub goal: usize,
     /// Which part of the plan this is.
     pub phase: Phase,
     /// Joint positions \[rad, m\].
@@ -36,8 +38,8 @@ pub struct Waypoint {
     pub dq: Joints,
 }
 
-/// One planned demonstration, sampled at [`crate::state::CONTROL_HZ`]. Phases come in the order of [`Phase::ALL`]; a pick-up ends with
-/// its carry (the lift).
+/// One planned demonstration, sampled at [`crate::state::CONTROL_HZ`]. For each goal of the task, in order, phases come
+/// in the order of [`Phase::ALL`]; a lift ends with its carry.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Plan {
     /// Episode number.
@@ -51,7 +53,7 @@ pub struct Plan {
 /// Why a scene has no plan.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum PlanError {
-    /// No joint angles put the open hand around the block, or the held block at its target.
+    /// No joint angles put the open hand around an object, or the held object at its target.
     #[error("grasp: {0}")]
     Grasp(String),
     /// No collision-free way between two hand poses.

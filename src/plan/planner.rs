@@ -1,12 +1,10 @@
 //! The planner: one attempt after another, each a grasp, its approach, and what follows.
 
-use super::grasp::{
-    CARRY_RISE_M, LIFTED_CENTER_M, PREGRASP_RISE_M, RETREAT_RISE_M, closed_on_block, grasps, raised, ready, releases,
-};
+use super::grasp::{CARRY_RISE_M, PREGRASP_RISE_M, RETREAT_RISE_M, closed_around, grasps, lift_m, raised, ready, releases};
 use super::path::{Knot, tool_pose};
 use super::smooth::Limits;
 use super::transit::{Leg, Motions, smooth_path};
-use super::world::{Block, PATH_CLEARANCES_M, World};
+use super::world::{Moved, PATH_CLEARANCES_M, World};
 use super::{Plan, PlanError, Waypoint};
 use crate::config::PlanSettings;
 use crate::demo::Phase;
@@ -14,7 +12,8 @@ use crate::interrupt::Interrupt;
 use crate::joints::Joints;
 use crate::robot::{Ik, Robot};
 use crate::scene::Scene;
-use crate::state::{CONTROL_DT_S, Context};
+use crate::state::CONTROL_DT_S;
+use crate::task::{Object, Task};
 use nalgebra::Isometry3;
 use rand::Rng;
 use std::sync::Arc;
@@ -25,16 +24,16 @@ const FINGER_SAMPLES: usize = 10;
 /// Makes plans; keeps its arm and its programs between them, which leave no trace in the results.
 pub struct Planner {
     motions: Motions,
-    /// See [`closing`].
-    closing: Vec<Joints>,
+    /// For each object that the task moves, see [`closing`].
+    closing: Vec<Vec<Joints>>,
 }
 
 impl Planner {
-    /// A planner for this robot with these settings.
-    pub fn new(robot: &Arc<Robot>, settings: &PlanSettings) -> Self {
+    /// A planner for this robot in this task with these settings.
+    pub fn new(robot: &Arc<Robot>, task: &Task, settings: &PlanSettings) -> Self {
         let limits = Limits::new(robot, settings);
         let interrupt = Interrupt::default();
-        let closing = closing(robot, &limits, &interrupt);
+        let closing = task.objects[..task.moved()].iter().map(|object| closing(robot, object, &limits, &interrupt)).collect();
         let (robot, ik) = (Arc::clone(robot), Ik::new(robot));
         Planner { motions: Motions { robot, settings: settings.clone(), limits, ik, interrupt }, closing }
     }
@@ -44,17 +43,35 @@ impl Planner {
         Planner { motions: Motions { interrupt: interrupt.clone(), ..self.motions }, ..self }
     }
 
-    /// Plans one demonstration of `scene`; `index` goes into the plan, `rng` is used only where a search is needed.
+    /// Plans one demonstration of `scene`, one of the planner's task; `index` goes into the plan, `rng` is used only where a search is needed.
     ///
     /// # Errors
     /// [`PlanError`]: which stage failed, and why; of several grasps, the one that came farthest, and of those the preferred one.
     pub fn plan(&mut self, index: u64, scene: &Scene, rng: &mut impl Rng) -> Result<Plan, PlanError> {
-        let world = World::new(scene);
+        let mut pieces = Vec::new();
+        let (mut at, mut from) = (ready(&self.motions.robot), self.motions.robot.ready);
+        for goal in 0..scene.task.goals.len() {
+            let world = World::new(scene, goal);
+            let (of_goal, end) = self.reach_goal(&world, (goal, at, from), rng)?;
+            from = end_of(&of_goal);
+            at = end;
+            pieces.extend(of_goal.into_iter().map(|piece| (goal, piece)));
+        }
+        Ok(Plan { index, scene: scene.clone(), waypoints: waypoints(&pieces) })
+    }
+
+    /// The pieces for one goal, from the hand's pose and the joint angles at the end of those before, and where the hand is then.
+    fn reach_goal(
+        &mut self,
+        world: &World,
+        (goal, from, start): (usize, Knot, Joints),
+        rng: &mut impl Rng,
+    ) -> Result<(Vec<Piece>, Knot), PlanError> {
         let mut farthest: Option<PlanError> = None;
         for margin_m in PATH_CLEARANCES_M {
-            for grasp in grasps(scene) {
-                match self.with_grasp(&Try { scene, world: &world, grasp, margin_m }, rng) {
-                    Ok(pieces) => return Ok(Plan { index, scene: scene.clone(), waypoints: waypoints(&pieces) }),
+            for grasp in grasps(world.scene, goal) {
+                match self.with_grasp(&Try { world, goal, from, start, grasp, margin_m }, rng) {
+                    Ok(found) => return Ok(found),
                     Err(error) if farthest.as_ref().is_none_or(|f| error.progress() > f.progress()) => farthest = Some(error),
                     Err(_) => {}
                 }
@@ -69,73 +86,74 @@ impl Planner {
         Err(farthest.expect("there is at least one grasp candidate"))
     }
 
-    /// The whole plan with one grasp and the first release that works.
-    fn with_grasp(&mut self, with: &Try, rng: &mut impl Rng) -> Result<Vec<Piece>, PlanError> {
+    /// The whole way to a goal with one grasp and the first release that works.
+    fn with_grasp(&mut self, with: &Try, rng: &mut impl Rng) -> Result<(Vec<Piece>, Knot), PlanError> {
+        let scene = with.world.scene;
         let approach = self.approach(with, rng)?;
-        if with.scene.context == Context::None {
-            return self.lift(with, approach, rng);
+        if !scene.task.goals[with.goal].kind().releases() {
+            let lifted = raised(&with.grasp, lift_m(scene, with.goal));
+            return Ok((self.lift(with, lifted, approach, rng)?, lifted));
         }
         let mut first = None;
-        for release in releases(with.scene, &with.grasp) {
+        for release in releases(scene, with.goal, &with.grasp) {
             match self.carry(with, &release, approach.clone(), rng) {
-                Ok(pieces) => return Ok(pieces),
+                Ok(pieces) => return Ok((pieces, raised(&release, RETREAT_RISE_M))),
                 Err(error) => first = first.or(Some(error)),
             }
         }
         Err(first.expect("there is at least one release candidate"))
     }
 
-    /// From the ready pose down to the grasp, and the fingers closed.
+    /// From where the hand is down to the grasp, and the fingers closed.
     fn approach(&mut self, with: &Try, rng: &mut impl Rng) -> Result<Vec<Piece>, PlanError> {
-        let (block, grasp) = (Block::Free(with.scene.block.isometry()), with.grasp);
+        let (block, grasp) = (Moved::Free(with.pose()), with.grasp);
         let above = raised(&grasp, PREGRASP_RISE_M);
-        let start = self.motions.robot.ready;
-        let q_above = self.motions.reach(&above, &start, "above the block")?;
-        let q = self.motions.reach(&grasp, &q_above, "at the block")?;
+        let name = &with.object().name;
+        let q_above = self.motions.reach(&above, &with.start, &format!("above the {name}"))?;
+        let q = self.motions.reach(&grasp, &q_above, &format!("at the {name}"))?;
         with.world
             .check(&q, &block, with.margin_m)
-            .map_err(|why| PlanError::Grasp(format!("with the open hand around the block, {why}")))?;
-        let from = ready(&self.motions.robot);
+            .map_err(|why| PlanError::Grasp(format!("with the open hand around the {name}, {why}")))?;
         let leg = Leg {
             phase: Phase::Approach,
             before: Vec::new(),
-            from,
+            from: with.from,
             to: above,
             after: vec![grasp],
-            block,
+            moved: block,
             margin_m: with.margin_m,
-            start,
+            start: with.start,
         };
         let q = self.motions.transit(with.world, &leg, rng)?;
-        let closing = self.fingers(Phase::Close, self.closing.iter(), &q[q.len() - 1]);
+        let closing = self.fingers(Phase::Close, self.closing[with.number()].iter(), &q[q.len() - 1]);
         Ok(vec![Piece { phase: Phase::Approach, q }, closing])
     }
 
-    /// Straight up with the block.
-    fn lift(&mut self, with: &Try, mut pieces: Vec<Piece>, rng: &mut impl Rng) -> Result<Vec<Piece>, PlanError> {
-        let lifted = raised(&with.grasp, LIFTED_CENTER_M - with.scene.block.position_m[2]);
-        let leg = with.straight_up(Phase::Carry, with.grasp, lifted, Block::Held(with.in_tool()), end_of(&pieces));
+    /// Straight up with the object.
+    fn lift(&mut self, with: &Try, lifted: Knot, mut pieces: Vec<Piece>, rng: &mut impl Rng) -> Result<Vec<Piece>, PlanError> {
+        let leg = with.straight_up(Phase::Carry, with.grasp, lifted, Moved::Held(with.in_tool()), end_of(&pieces));
         pieces.push(Piece { phase: Phase::Carry, q: self.motions.transit(with.world, &leg, rng)? });
         Ok(pieces)
     }
 
     /// Lift, move and lower; the fingers opened, and straight up.
     fn carry(&mut self, with: &Try, release: &Knot, mut pieces: Vec<Piece>, rng: &mut impl Rng) -> Result<Vec<Piece>, PlanError> {
-        let (block, start, grasp) = (Block::Held(with.in_tool()), end_of(&pieces), with.grasp);
+        let (held, start, grasp) = (Moved::Held(with.in_tool()), end_of(&pieces), with.grasp);
         let height = grasp.z.max(release.z) + CARRY_RISE_M;
         let (from, to) = (raised(&grasp, height - grasp.z), raised(release, height - release.z));
         let q_above = self.motions.reach(&to, &start, "above the target")?;
         let mut q = self.motions.reach(release, &q_above, "at the target")?;
-        let placed = Block::Free(tool_pose(release) * with.in_tool());
-        let at_target = |why| PlanError::Grasp(format!("with the block at its target, {why}"));
-        with.world.check(&q, &block, with.margin_m).map_err(at_target)?;
+        let placed = Moved::Free(tool_pose(release) * with.in_tool());
+        let name = &with.object().name;
+        let at_target = |why| PlanError::Grasp(format!("with the {name} at its target, {why}"));
+        with.world.check(&q, &held, with.margin_m).map_err(at_target)?;
         let robot = &self.motions.robot;
         q[robot.arm..].copy_from_slice(&robot.ready[robot.arm..]);
         with.world.check(&q, &placed, with.margin_m).map_err(at_target)?;
         let (before, after) = (vec![grasp], vec![*release]);
-        let leg = Leg { phase: Phase::Carry, before, from, to, after, block, margin_m: with.margin_m, start };
+        let leg = Leg { phase: Phase::Carry, before, from, to, after, moved: held, margin_m: with.margin_m, start };
         pieces.push(Piece { phase: Phase::Carry, q: self.motions.transit(with.world, &leg, rng)? });
-        pieces.push(self.fingers(Phase::Open, self.closing.iter().rev(), &end_of(&pieces)));
+        pieces.push(self.fingers(Phase::Open, self.closing[with.number()].iter().rev(), &end_of(&pieces)));
         let leg = with.straight_up(Phase::Retreat, *release, raised(release, RETREAT_RISE_M), placed, end_of(&pieces));
         pieces.push(Piece { phase: Phase::Retreat, q: self.motions.transit(with.world, &leg, rng)? });
         Ok(pieces)
@@ -149,32 +167,48 @@ impl Planner {
     }
 }
 
-/// The hand that closes around a block, from open, in the ready pose, at the control rate; backwards, it opens.
-fn closing(robot: &Robot, limits: &Limits, interrupt: &Interrupt) -> Vec<Joints> {
-    let (open, closed) = (robot.ready, closed_on_block(robot));
+/// The hand that closes around an object, from open, in the ready pose, at the control rate; backwards, it opens.
+fn closing(robot: &Robot, object: &Object, limits: &Limits, interrupt: &Interrupt) -> Vec<Joints> {
+    let (open, closed) = (robot.ready, closed_around(robot, object));
     let at = |k: usize| Joints::from_fn(open.len(), |j| open[j] + (closed[j] - open[j]) * k as f64 / FINGER_SAMPLES as f64);
     let path: Vec<Joints> = (0..=FINGER_SAMPLES).map(at).collect();
     // Where even that fails, the fingers jump in the plan; the follower drives them by speed in any case.
     smooth_path(&path, limits, interrupt).unwrap_or(vec![open, closed])
 }
 
-/// One attempt: a scene, a grasp, and the distance to keep.
+/// One attempt at a goal: where the hand comes from, a grasp, and the distance to keep.
 struct Try<'a> {
-    scene: &'a Scene,
-    world: &'a World,
+    world: &'a World<'a>,
+    goal: usize,
+    from: Knot,
+    start: Joints,
     grasp: Knot,
     margin_m: f64,
 }
 
 impl Try<'_> {
-    /// The held block's pose relative to the tool.
+    /// The object that is moved, by its place in the task.
+    fn number(&self) -> usize {
+        self.world.scene.task.goals[self.goal].object
+    }
+
+    fn object(&self) -> &Object {
+        &self.world.scene.task.objects[self.number()]
+    }
+
+    /// Where it stands.
+    fn pose(&self) -> Isometry3<f64> {
+        self.world.scene.objects[self.number()].pose.isometry()
+    }
+
+    /// The held object's pose relative to the tool.
     fn in_tool(&self) -> Isometry3<f64> {
-        tool_pose(&self.grasp).inv_mul(&self.scene.block.isometry())
+        tool_pose(&self.grasp).inv_mul(&self.pose())
     }
 
     /// A straight motion with nothing fixed before or behind it.
-    fn straight_up(&self, phase: Phase, from: Knot, to: Knot, block: Block, start: Joints) -> Leg {
-        Leg { phase, before: Vec::new(), from, to, after: Vec::new(), block, margin_m: self.margin_m, start }
+    fn straight_up(&self, phase: Phase, from: Knot, to: Knot, moved: Moved, start: Joints) -> Leg {
+        Leg { phase, before: Vec::new(), from, to, after: Vec::new(), moved, margin_m: self.margin_m, start }
     }
 }
 
@@ -191,14 +225,14 @@ fn end_of(pieces: &[Piece]) -> Joints {
     q[q.len() - 1]
 }
 
-/// The pieces one after another; each but the first leaves out the sample it begins with, the last of the one before.
-fn waypoints(pieces: &[Piece]) -> Vec<Waypoint> {
+/// The pieces one after another, each with its goal; each but the first leaves out the sample it begins with, the last of the one before.
+fn waypoints(pieces: &[(usize, Piece)]) -> Vec<Waypoint> {
     let mut waypoints = Vec::new();
-    for (number, piece) in pieces.iter().enumerate() {
+    for (number, (goal, piece)) in pieces.iter().enumerate() {
         for (k, q) in piece.q.iter().enumerate().skip(usize::from(number > 0)) {
             let next = piece.q.get(k + 1).unwrap_or(q);
             let dq = Joints::from_fn(q.len(), |j| (next[j] - q[j]) / CONTROL_DT_S);
-            waypoints.push(Waypoint { phase: piece.phase, q: *q, dq });
+            waypoints.push(Waypoint { goal: *goal, phase: piece.phase, q: *q, dq });
         }
     }
     waypoints

@@ -1,8 +1,8 @@
 //! RRT-Connect and shortcutting for transits that are not free in a straight line. Configurations are joint angles on the set where the hand
-//! is level: every step goes to a level pose and takes the arm along by inverse kinematics, so a carried block stays upright.
+//! is level: every step goes to a level pose and takes the arm along by inverse kinematics, so a carried object stays upright.
 
 use super::path::{Knot, tool_pose};
-use super::world::{Block, World};
+use super::world::{Moved, World};
 use crate::interrupt::Interrupt;
 use crate::joints::Joints;
 use crate::robot::Ik;
@@ -26,8 +26,8 @@ struct Node {
 /// What a search needs to know.
 pub(super) struct Search<'a> {
     pub(super) ik: &'a mut Ik,
-    pub(super) world: &'a World,
-    pub(super) block: &'a Block,
+    pub(super) world: &'a World<'a>,
+    pub(super) moved: &'a Moved,
     /// Distance to keep from everything fixed \[m\].
     pub(super) margin_m: f64,
     pub(super) iterations: usize,
@@ -70,7 +70,7 @@ impl Search<'_> {
         let way = goal - from.knot;
         let knot = if way.norm() <= STEP_M { *goal } else { from.knot + way * (STEP_M / way.norm()) };
         let q = self.ik.solve(&tool_pose(&knot), &from.q).ok()?;
-        self.world.check_motion(&from.q, &q, self.block, self.margin_m).ok()?;
+        self.world.check_motion(&from.q, &q, self.moved, self.margin_m).ok()?;
         Some(Node { knot, q, parent: at })
     }
 

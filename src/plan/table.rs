@@ -9,21 +9,27 @@ use crate::robot::Robot;
 use crate::robot::model::Joint;
 use crate::scene::Scene;
 use crate::table::{Table, Values};
+use crate::task::Task;
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-/// Plans of a robot as a table, one row per waypoint: `episode`, `step`, `phase`, `<joint>.q_rad` and `<joint>.dq_rad_s` per joint (`q_m`, `dq_m_s` of
+/// Plans of a robot as a table, one row per waypoint: `episode`, `step`, `goal`, `phase`, `<joint>.q_rad` and `<joint>.dq_rad_s` per joint (`q_m`, `dq_m_s` of
 /// one that slides), and `scene`, the scene as JSON on the first row of each episode (empty text on the others).
 pub fn to_table(robot: &Robot, plans: &[Plan]) -> Table {
     let rows = || plans.iter().flat_map(|p| p.waypoints.iter().enumerate().map(move |(step, w)| (p, step, w)));
     let scene = |p: &Plan, step: usize| match step {
-        0 => serde_json::to_string(&p.scene).expect("a scene is plain data with text keys"),
+        0 => p.scene.to_json().to_string(),
         _ => String::new(),
     };
     let mut table = Table::default()
         .with("episode", "Episode number.", Values::I64(rows().map(|(p, ..)| p.index as i64).collect()))
         .with("step", "Control step within the episode, from 0.", Values::I64(rows().map(|(_, step, _)| step as i64).collect()))
+        .with(
+            "goal",
+            "Goal of the task that the step is for, from 0.",
+            Values::I64(rows().map(|(.., w)| w.goal as i64).collect()),
+        )
         .with("phase", "Part of the plan.", Values::Text(rows().map(|(.., w)| w.phase.name().into()).collect()));
     for (j, joint) in robot.joints.iter().enumerate() {
         let position = Values::F64(rows().map(|(.., w)| w.q[j]).collect());
@@ -40,13 +46,13 @@ pub fn to_table(robot: &Robot, plans: &[Plan]) -> Table {
     )
 }
 
-/// The inverse of [`to_table`], of plans of `robot`.
+/// The inverse of [`to_table`], of plans of `robot` in `task`. Where no goals are said, all is for the first.
 ///
 /// # Errors
 /// Says which column is missing or of another type, and in which row a number is not finite, a phase unknown, a scene unreadable, or the
 /// order of episodes, steps or phases broken.
-pub fn from_table(robot: &Arc<Robot>, table: &Table) -> Result<Vec<Plan>, String> {
-    let mut rows = Rows::new(robot);
+pub fn from_table(robot: &Arc<Robot>, task: &Arc<Task>, table: &Table) -> Result<Vec<Plan>, String> {
+    let mut rows = Rows::new(robot, task);
     let mut plans = rows.take(table)?;
     plans.extend(rows.open);
     Ok(plans)
@@ -61,9 +67,9 @@ pub struct Plans<T> {
 }
 
 impl<T> Plans<T> {
-    /// Of the pieces of a table of plans of `robot`; errors speak of `path`.
-    pub fn new(path: &Path, robot: &Arc<Robot>, tables: T) -> Self {
-        Plans { path: path.to_path_buf(), tables, rows: Rows::new(robot), ready: Vec::new().into_iter() }
+    /// Of the pieces of a table of plans of `robot` in `task`; errors speak of `path`.
+    pub fn new(path: &Path, (robot, task): (&Arc<Robot>, &Arc<Task>), tables: T) -> Self {
+        Plans { path: path.to_path_buf(), tables, rows: Rows::new(robot, task), ready: Vec::new().into_iter() }
     }
 }
 
@@ -87,6 +93,7 @@ impl<T: Iterator<Item = crate::error::Result<Table>>> Iterator for Plans<T> {
 /// What is known of the rows so far.
 struct Rows {
     robot: Arc<Robot>,
+    task: Arc<Task>,
     count: usize,
     begun: HashSet<u64>,
     /// The plan of the last row, which may go on.
@@ -94,15 +101,16 @@ struct Rows {
 }
 
 impl Rows {
-    fn new(robot: &Arc<Robot>) -> Self {
-        Rows { robot: Arc::clone(robot), count: 0, begun: HashSet::new(), open: None }
+    fn new(robot: &Arc<Robot>, task: &Arc<Task>) -> Self {
+        Rows { robot: Arc::clone(robot), task: Arc::clone(task), count: 0, begun: HashSet::new(), open: None }
     }
 
     /// The plans that are known to end: all but the one of the last row.
     fn take(&mut self, table: &Table) -> Result<Vec<Plan>, String> {
         let (episodes, steps) = (integers(table, "episode")?, integers(table, "step")?);
         let (phases, scenes) = (texts(table, "phase")?, texts(table, "scene")?);
-        let robot = Arc::clone(&self.robot);
+        let goals = table.column("goal").map(|_| integers(table, "goal")).transpose()?;
+        let (robot, task) = (Arc::clone(&self.robot), Arc::clone(&self.task));
         let columns = |name: fn(&Joint) -> String| {
             robot.joints.iter().map(|joint| floats(table, &name(joint))).collect::<Result<Vec<_>, _>>()
         };
@@ -117,13 +125,16 @@ impl Rows {
                 at(format!("unknown phase \"{}\"; allowed: {}", phases[row], Phase::ALL.map(Phase::name).join(", ")))
             })?;
             let (q, dq) = (numbers(&robot, &q, row).map_err(at)?, numbers(&robot, &dq, row).map_err(at)?);
-            let waypoint = Waypoint { phase, q, dq };
+            let said = goals.map_or(0, |goals| goals[row]);
+            let goal = usize::try_from(said).ok().filter(|goal| *goal < task.goals.len());
+            let goal = goal.ok_or_else(|| at(format!("goal {said}; {task} has 0 to {}", task.goals.len() - 1)))?;
+            let waypoint = Waypoint { goal, phase, q, dq };
             let index = u64::try_from(episodes[row]).map_err(|_| at(format!("episode {} is negative", episodes[row])))?;
             if steps[row] == 0 {
                 if !self.begun.insert(index) {
                     return Err(at(format!("episode {index} begins a second time")));
                 }
-                let scene = scene(&robot, &scenes[row]).map_err(at)?;
+                let scene = scene(&robot, &task, &scenes[row]).map_err(at)?;
                 ended.extend(self.open.replace(Plan { index, scene, waypoints: vec![waypoint] }));
             } else {
                 go_on(self.open.as_mut(), index, steps[row], waypoint).map_err(at)?;
@@ -138,7 +149,11 @@ impl Rows {
 fn go_on(open: Option<&mut Plan>, index: u64, step: i64, waypoint: Waypoint) -> Result<(), String> {
     let plan = open.filter(|p| p.index == index && p.waypoints.len() as i64 == step);
     let plan = plan.ok_or_else(|| format!("episode {index} step {step} does not follow the row before"))?;
-    if plan.waypoints[plan.waypoints.len() - 1].phase > waypoint.phase {
+    let last = &plan.waypoints[plan.waypoints.len() - 1];
+    if last.goal > waypoint.goal {
+        return Err(format!("goal {} comes after a later one", waypoint.goal));
+    }
+    if last.goal == waypoint.goal && last.phase > waypoint.phase {
         return Err(format!("phase {} comes after a later one", waypoint.phase.name()));
     }
     if plan.waypoints.len() > MOST_STEPS as usize {
@@ -148,9 +163,8 @@ fn go_on(open: Option<&mut Plan>, index: u64, step: i64, waypoint: Waypoint) -> 
     Ok(())
 }
 
-fn scene(robot: &Arc<Robot>, json: &str) -> Result<Scene, String> {
-    let scene: Scene = serde_json::from_str(json).map_err(|e| format!("the scene cannot be read: {e}"))?;
-    let scene = Scene { robot: Arc::clone(robot), ..scene };
+fn scene(robot: &Arc<Robot>, task: &Arc<Task>, json: &str) -> Result<Scene, String> {
+    let scene = Scene::from_json(robot, task, json).map_err(|e| format!("the scene cannot be read: {e}"))?;
     check_scene(&scene).map_err(|why| format!("the scene cannot be: {why}"))?;
     Ok(scene)
 }

@@ -6,7 +6,7 @@ use super::path::{Knot, follow, tool_pose};
 use super::search::Search;
 use super::smooth::{Limits, smooth};
 use super::timing::time;
-use super::world::{Block, CLEARANCE_M, World};
+use super::world::{CLEARANCE_M, Moved, World};
 use crate::config::{MOST_STEPS, PlanSettings};
 use crate::demo::Phase;
 use crate::interrupt::Interrupt;
@@ -35,7 +35,7 @@ pub(super) struct Leg {
     pub(super) to: Knot,
     /// Fixed knots behind `to`: the last straight stretch down.
     pub(super) after: Vec<Knot>,
-    pub(super) block: Block,
+    pub(super) moved: Moved,
     /// Distance that the path keeps before smoothing \[m\].
     pub(super) margin_m: f64,
     /// Joint angles at the first knot \[rad\].
@@ -109,11 +109,11 @@ impl Motions {
         }
         let path = follow(&mut self.ik, knots, corner_m, &leg.start).map_err(|why| transit(why.to_string()))?;
         if world.has_obstacles() {
-            clear(world, &path, &leg.block, leg.margin_m).map_err(transit)?;
+            clear(world, &path, &leg.moved, leg.margin_m).map_err(transit)?;
         }
         let smoothing = |why: String| PlanError::Smoothing(format!("{}: {why}", leg.phase.name()));
         let samples = smooth_path(&path, &self.limits, &self.interrupt).map_err(smoothing)?;
-        clear(world, &samples, &leg.block, CLEARANCE_M).map_err(smoothing)?;
+        clear(world, &samples, &leg.moved, CLEARANCE_M).map_err(smoothing)?;
         Ok(samples)
     }
 
@@ -126,7 +126,7 @@ impl Motions {
         self.ik.solve(&tool_pose(knot), seed).map_err(|why| {
             PlanError::Grasp(format!(
                 "the level hand cannot reach {place}: {why}; {reaches}, set the spawn area \
-                 (scene.spawn_x_m, scene.spawn_y_m) and scene.base_xy_m within"
+                 (scene.spawn_x_m, scene.spawn_y_m), scene.base_xy_m and the places of the task within"
             ))
         })
     }
@@ -137,12 +137,12 @@ impl Motions {
         let (from, to) = (from?, to?);
         let margin_m = leg.margin_m + ROUNDING_M;
         for q in [&from, &to] {
-            world.check(q, &leg.block, margin_m).map_err(|why| format!("an end of the search is blocked: {why}"))?;
+            world.check(q, &leg.moved, margin_m).map_err(|why| format!("an end of the search is blocked: {why}"))?;
         }
         let iterations = self.settings.search_iterations;
         let shortcuts = self.settings.shortcut_iterations;
         let interrupt = &self.interrupt;
-        let mut search = Search { ik: &mut self.ik, world, block: &leg.block, margin_m, iterations, shortcuts, interrupt };
+        let mut search = Search { ik: &mut self.ik, world, moved: &leg.moved, margin_m, iterations, shortcuts, interrupt };
         search.connect((leg.from, from), (leg.to, to), rng).ok_or_else(|| {
             format!("no other way was found in {iterations} iterations; raise plan.search_iterations or move the obstacles")
         })
@@ -174,6 +174,6 @@ fn too_long(steps: f64) -> String {
 }
 
 /// Checks a joint path at the resolution of the collision check.
-fn clear(world: &World, path: &[Joints], block: &Block, margin_m: f64) -> Result<(), String> {
-    path.windows(2).try_for_each(|w| world.check_motion(&w[0], &w[1], block, margin_m))
+fn clear(world: &World, path: &[Joints], moved: &Moved, margin_m: f64) -> Result<(), String> {
+    path.windows(2).try_for_each(|w| world.check_motion(&w[0], &w[1], moved, margin_m))
 }

@@ -1,12 +1,12 @@
-//! What a plan must keep clear of: table, obstacles, base block, the block itself, and the arm's own base.
+//! What a plan must keep clear of: table, obstacles, other objects, the object itself, and the arm's own base.
 
 use crate::config::SceneSettings;
 use crate::error::{Error, Result};
 use crate::joints::Joints;
 use crate::robot::Robot;
 use crate::robot::collision::Solid;
-use crate::scene::{BLOCK_EDGE_M, Obstacle, Scene};
-use crate::state::Context;
+use crate::scene::{Obstacle, Scene};
+use crate::task::Target;
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 use std::sync::Arc;
 
@@ -16,15 +16,15 @@ pub const CLEARANCE_M: f64 = 0.01;
 pub(super) const PATH_CLEARANCES_M: [f64; 2] = [2.0 * CLEARANCE_M, CLEARANCE_M];
 /// Least height of hand and fingers above the table \[m\]: closed fingers reach 19 mm below the tool point.
 const HAND_TABLE_M: f64 = 0.002;
-/// Least distance of the open hand to the block \[m\]: the fingers straddle it.
-const HAND_BLOCK_M: f64 = 0.003;
+/// Least distance of the open hand to the object that it straddles \[m\].
+const HAND_OBJECT_M: f64 = 0.003;
 /// Least distance between the arm's own links \[m\].
 const SELF_M: f64 = 0.005;
 /// Joints of the wrist: what they move may meet foot, shoulder and upper arm.
 const WRIST: usize = 3;
-/// The carried block may sink this far into its support \[m\]: it begins in contact, and the numbers are rounded.
+/// The carried object may sink this far into its support \[m\]: it begins in contact, and the numbers are rounded.
 const SUPPORT_SLACK_M: f64 = 1e-3;
-/// The support of the block may be touched within this distance of grasp and release, sideways \[m\] ...
+/// The support of the object may be touched within this distance of grasp and release, sideways \[m\] ...
 const SUPPORT_ZONE_XY_M: f64 = 0.015;
 /// ... and upward \[m\].
 const SUPPORT_ZONE_Z_M: f64 = 0.05;
@@ -34,9 +34,9 @@ pub const RESOLUTION_M: f64 = 0.01;
 /// Whether nothing comes too near; what does, in words.
 type Free = std::result::Result<(), String>;
 
-/// Where the block is while a piece of the plan is executed.
+/// Where the object to move is while a piece of the plan is executed.
 #[derive(Clone, Copy, Debug)]
-pub(super) enum Block {
+pub(super) enum Moved {
     /// It stands free in this pose; the open hand must not push it.
     Free(Isometry3<f64>),
     /// The hand holds it, in this pose relative to the tool.
@@ -64,19 +64,27 @@ pub fn check_ready_pose(robot: &Robot, settings: &SceneSettings) -> Result<()> {
     Ok(())
 }
 
-/// The fixed things of a scene.
+/// What stands in the way to a goal: the fixed things of a scene, and its objects where they are when the goals before hold.
 #[derive(Clone, Debug)]
-pub(super) struct World {
+pub(super) struct World<'a> {
+    pub(super) scene: &'a Scene,
     robot: Arc<Robot>,
     obstacles: Vec<Solid>,
-    base_block: Option<Solid>,
-    /// Where the block's centre is released \[m\].
+    /// Other objects than the one that is moved, with their names.
+    others: Vec<(String, Solid)>,
+    /// What the object is put on, or into, with its name.
+    support: Option<(String, Vec<Solid>)>,
+    /// The moved object's name.
+    name: String,
+    /// Half of its edges \[m\].
+    half_m: [f64; 3],
+    /// Where the tool releases the object, or the object's centre if that is higher \[m\].
     release_m: Vector3<f64>,
 }
 
-impl World {
-    /// From a scene.
-    pub(super) fn new(scene: &Scene) -> Self {
+impl<'a> World<'a> {
+    /// On the way to a goal.
+    pub(super) fn new(scene: &'a Scene, goal: usize) -> Self {
         let half = |size: [f64; 3]| size.map(|s| s / 2.0);
         let obstacles = scene
             .obstacles
@@ -85,39 +93,53 @@ impl World {
                 Solid::cuboid(Isometry3::from_parts(Translation3::from(o.center_m), UnitQuaternion::identity()), half(o.size_m))
             })
             .collect();
-        let base_block = match scene.context {
-            Context::Base(base) => Some(Solid::cuboid(base.isometry(), [BLOCK_EDGE_M / 2.0; 3])),
-            _ => None,
+        let task = &scene.task;
+        let number = task.goals[goal].object;
+        let supports = match task.goals[goal].target {
+            Target::On(other) | Target::In(other) => Some(other),
+            Target::Lift { .. } | Target::At { .. } => None,
         };
-        World { robot: Arc::clone(&scene.robot), obstacles, base_block, release_m: scene.target_m().into() }
+        let solids = |other: usize| -> Vec<Solid> {
+            let mut at = scene.objects[other].pose.isometry();
+            at.translation = Translation3::from(scene.place_after(other, goal));
+            let boxes = task.objects[other].shape.boxes_m();
+            boxes.into_iter().map(|(center, half_m)| Solid::cuboid(at * Translation3::from(center), half_m)).collect()
+        };
+        let name = |other: usize| task.objects[other].name.clone();
+        let others = (0..task.objects.len()).filter(|other| *other != number && Some(*other) != supports);
+        let others = others.flat_map(|other| solids(other).into_iter().map(move |solid| (name(other), solid))).collect();
+        let support = supports.map(|other| (name(other), solids(other)));
+        let release_m = Vector3::from(scene.target_m(goal)) + Vector3::z() * task.objects[number].held_m();
+        let half_m = task.objects[number].shape.half_m();
+        World { scene, robot: Arc::clone(&scene.robot), obstacles, others, support, name: name(number), half_m, release_m }
     }
 
     /// Whether anything stands there that a straight way could meet.
     pub(super) fn has_obstacles(&self) -> bool {
-        !self.obstacles.is_empty()
+        !self.obstacles.is_empty() || !self.others.is_empty()
     }
 
     /// Whether the arm at `q` keeps `margin_m` from everything fixed.
     ///
     /// # Errors
     /// Names what comes too near to what.
-    pub(super) fn check(&self, q: &Joints, block: &Block, margin_m: f64) -> Free {
-        self.check_poses(&self.robot.link_poses(q), block, margin_m)
+    pub(super) fn check(&self, q: &Joints, moved: &Moved, margin_m: f64) -> Free {
+        self.check_poses(&self.robot.link_poses(q), moved, margin_m)
     }
 
     /// The same along the straight joint path between two configurations, at [`RESOLUTION_M`]; the first one is not checked.
-    pub(super) fn check_motion(&self, from: &Joints, to: &Joints, block: &Block, margin_m: f64) -> Free {
+    pub(super) fn check_motion(&self, from: &Joints, to: &Joints, moved: &Moved, margin_m: f64) -> Free {
         let end = self.robot.link_poses(to);
         let steps = (self.travel_m(&self.robot.link_poses(from), &end) / RESOLUTION_M).ceil().max(1.0) as usize;
         for k in 1..steps {
             let t = k as f64 / steps as f64;
             let q = Joints::from_fn(from.len(), |i| from[i] + t * (to[i] - from[i]));
-            self.check(&q, block, margin_m)?;
+            self.check(&q, moved, margin_m)?;
         }
-        self.check_poses(&end, block, margin_m)
+        self.check_poses(&end, moved, margin_m)
     }
 
-    fn check_poses(&self, poses: &[Isometry3<f64>], block: &Block, margin_m: f64) -> Free {
+    fn check_poses(&self, poses: &[Isometry3<f64>], moved: &Moved, margin_m: f64) -> Free {
         let links = self.robot.solids(poses);
         let tool = self.robot.tool_of(poses);
         let at_release = self.at_release(&tool);
@@ -130,19 +152,20 @@ impl World {
             }
             let base_margin = if finger && at_release { HAND_TABLE_M } else { margin_m };
             self.check_fixed(solid, name, margin_m, base_margin)?;
-            if let (true, Block::Free(pose)) = (hand, block)
-                && !solid.farther_than(&Solid::cuboid(*pose, [BLOCK_EDGE_M / 2.0; 3]), HAND_BLOCK_M)
+            if let (true, Moved::Free(pose)) = (hand, moved)
+                && !solid.farther_than(&Solid::cuboid(*pose, self.half_m), HAND_OBJECT_M)
             {
-                return Err(format!("{name} would push the block"));
+                return Err(format!("{name} would push the {}", self.name));
             }
         }
-        if let Block::Held(in_tool) = block {
-            let carried = Solid::cuboid(tool * in_tool, [BLOCK_EDGE_M / 2.0; 3]);
+        if let Moved::Held(in_tool) = moved {
+            let carried = Solid::cuboid(tool * in_tool, self.half_m);
+            let name = format!("the carried {}", self.name);
             if carried.lowest_m() < -SUPPORT_SLACK_M {
-                return Err("the carried block is pressed into the table".into());
+                return Err(format!("{name} is pressed into the table"));
             }
             let base_margin = if at_release { -SUPPORT_SLACK_M } else { margin_m };
-            self.check_fixed(&carried, "the carried block", margin_m, base_margin)?;
+            self.check_fixed(&carried, &name, margin_m, base_margin)?;
         }
         self.check_self(&links)
     }
@@ -151,8 +174,13 @@ impl World {
         if let Some(i) = self.obstacles.iter().position(|o| !solid.farther_than(o, margin_m)) {
             return Err(format!("{name} comes within {:.0} mm of obstacle {i}", margin_m * 1e3));
         }
-        match &self.base_block {
-            Some(base) if !solid.farther_than(base, base_margin_m) => Err(format!("{name} comes too near to the base block")),
+        if let Some((other, _)) = self.others.iter().find(|(_, o)| !solid.farther_than(o, margin_m)) {
+            return Err(format!("{name} comes within {:.0} mm of the {other}", margin_m * 1e3));
+        }
+        match &self.support {
+            Some((support, parts)) if parts.iter().any(|part| !solid.farther_than(part, base_margin_m)) => {
+                Err(format!("{name} comes too near to the {support}"))
+            }
             _ => Ok(()),
         }
     }

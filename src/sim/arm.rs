@@ -15,7 +15,7 @@ const MOTOR_GAIN: Real = 1e5;
 /// Limits nearer than this are looked at \[rad, and what counts as one\]: twice what a motor turns in a control step, beside what the joint's own
 /// velocity makes.
 const LIMIT_MARGIN_RAD: f64 = 0.1;
-/// Friction coefficient of the robot's surfaces and of the fixed things; the block's own multiplies it.
+/// Friction coefficient of the robot's surfaces and of the fixed things; that of objects multiplies it.
 pub(super) const SURFACE_FRICTION: Real = 1.0;
 
 /// The axis along which rapier moves a joint: about the local x axis, or along it.

@@ -2,6 +2,7 @@
 
 use crate::demo::Contacts;
 use crate::robot::Robot;
+use crate::task::MOST_OBJECTS;
 use rapier3d::parry::bounding_volume::BoundingVolume;
 use rapier3d::prelude::{Collider, ContactPair, PhysicsWorld, Pose};
 
@@ -15,22 +16,23 @@ const NEAR_M: f32 = 0.04;
 pub(super) enum Owner {
     Table,
     Obstacle,
-    Block,
-    Base,
+    /// An object of the task, by its place there.
+    Object(usize),
     /// A link of the robot, by index.
     Link(usize),
 }
 
+/// User data of the first object; the others follow.
+const FIRST_OBJECT_CODE: u128 = 2;
 /// User data of link 0; the others follow.
-const FIRST_LINK_CODE: u128 = 4;
+const FIRST_LINK_CODE: u128 = FIRST_OBJECT_CODE + MOST_OBJECTS as u128;
 
 impl Owner {
     pub(super) fn code(self) -> u128 {
         match self {
             Owner::Table => 0,
             Owner::Obstacle => 1,
-            Owner::Block => 2,
-            Owner::Base => 3,
+            Owner::Object(i) => FIRST_OBJECT_CODE + i as u128,
             Owner::Link(i) => FIRST_LINK_CODE + i as u128,
         }
     }
@@ -39,29 +41,31 @@ impl Owner {
         match collider.user_data {
             0 => Owner::Table,
             1 => Owner::Obstacle,
-            2 => Owner::Block,
-            3 => Owner::Base,
-            link => Owner::Link((link - FIRST_LINK_CODE) as usize),
+            link @ FIRST_LINK_CODE.. => Owner::Link((link - FIRST_LINK_CODE) as usize),
+            object => Owner::Object((object - FIRST_OBJECT_CODE) as usize),
         }
     }
 }
 
-/// Reads all contacts of the last physics step.
-pub(super) fn read(physics: &PhysicsWorld, robot: &Robot) -> Contacts {
-    let (mut contacts, hand) = (Contacts::none(robot.fingers().len()), robot.hand());
+/// Reads all contacts of the last physics step, in a task of so many objects.
+pub(super) fn read(physics: &PhysicsWorld, robot: &Robot, objects: usize) -> Contacts {
+    let (mut contacts, hand) = (Contacts::none(robot.fingers().len(), objects), robot.hand());
     for pair in physics.contact_pairs() {
         let [one, other] = [pair.collider1, pair.collider2].map(|h| &physics.colliders[h]);
         if force_n(pair, physics) <= 0.0 && separation(pair, one.position(), other.position()) > TOUCH_M {
             continue;
         }
         match ordered(Owner::of(one), Owner::of(other)) {
-            (Owner::Link(link), Owner::Block) if link > hand => {
-                contacts.finger_block_n[link - hand - 1] += force_n(pair, physics)
+            (Owner::Link(link), Owner::Object(object)) if link > hand => {
+                contacts.objects[object].fingers_n[link - hand - 1] += force_n(pair, physics)
             }
             (Owner::Link(_), Owner::Obstacle) => contacts.robot_obstacle = true,
             (Owner::Link(_), Owner::Table) => contacts.robot_table = true,
-            (Owner::Block, Owner::Table) => contacts.block_table = true,
-            (Owner::Block, Owner::Base) => contacts.block_base = true,
+            (Owner::Object(object), Owner::Table) => contacts.objects[object].table = true,
+            (Owner::Object(one), Owner::Object(other)) => {
+                contacts.objects[one].objects.insert(other);
+                contacts.objects[other].objects.insert(one);
+            }
             _ => {}
         }
     }
@@ -81,11 +85,11 @@ pub(super) fn force_n(pair: &ContactPair, physics: &PhysicsWorld) -> f64 {
     f64::from(pair.total_impulse_magnitude() / physics.integration_parameters.dt)
 }
 
-/// Links first, then the block, then what stands still.
+/// Links first, then objects, then what stands still.
 fn ordered(one: Owner, other: Owner) -> (Owner, Owner) {
     let rank = |o: Owner| match o {
         Owner::Link(_) => 0,
-        Owner::Block => 1,
+        Owner::Object(_) => 1,
         _ => 2,
     };
     if rank(one) <= rank(other) { (one, other) } else { (other, one) }

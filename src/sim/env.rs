@@ -18,7 +18,7 @@ use std::sync::Arc;
 /// demonstration, selection or evaluation has them. There are no pulses, as in an evaluation.
 pub struct TaskEnv {
     robot: Arc<Robot>,
-    task: Task,
+    task: Arc<Task>,
     observation_len: usize,
     scene: SceneSettings,
     noise: SimulateSettings,
@@ -45,7 +45,7 @@ impl TaskEnv {
         let pulses = PulseSettings { probability: 0.0, ..pipeline.simulate.pulses.clone() };
         TaskEnv {
             robot: Arc::clone(robot),
-            task: pipeline.task,
+            task: Arc::clone(&pipeline.task),
             observation_len: pipeline.task.layout(robot).state_dim(),
             scene: pipeline.scene.clone(),
             noise: SimulateSettings { pulses, ..pipeline.simulate.clone() },
@@ -68,7 +68,7 @@ impl Env for TaskEnv {
     }
 
     fn reset(&mut self, episode: u64, observation: &mut [f32]) -> Result<()> {
-        let scene = draw_scene(&self.robot, self.task, &self.scene, &mut stream(self.seed, "train.ppo.scene", episode))?;
+        let scene = draw_scene(&self.robot, &self.task, &self.scene, &mut stream(self.seed, "train.ppo.scene", episode))?;
         let begun = guarded(|| {
             let mut world = World::new(&scene);
             let first = world.observe();

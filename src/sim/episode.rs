@@ -2,13 +2,13 @@
 
 use super::disturbance::Disturbance;
 use super::world::World;
-use crate::demo::{Contacts, Episode, LARGEST_NUMBER, Phase, Step};
+use crate::demo::{Body, Contacts, Episode, LARGEST_NUMBER, Phase, Step};
 use crate::error::Result;
 use crate::guard::guarded;
 use crate::interrupt::Interrupt;
 use crate::joints::Joints;
 use crate::scene::Scene;
-use crate::state::{Action, Context, State};
+use crate::state::Action;
 use crate::tasks::{FailureClass, Monitor, Observation, Verdict};
 use std::sync::Arc;
 
@@ -23,7 +23,7 @@ pub trait Controller {
     }
 }
 
-/// Runs one episode until success (its last 0.5 s is the proof), `max_steps`, a block below the table, a command that is no number, or a
+/// Runs one episode until success (its last 0.5 s is the proof), `max_steps`, an object below the table, a command that is no number, or a
 /// simulation that breaks down: its numbers are none or beyond all measure, or the engine panics. Such a moment or command is left out of the record.
 ///
 /// # Errors
@@ -72,7 +72,7 @@ struct Run<'a> {
 impl<'a> Run<'a> {
     fn new(scene: &'a Scene) -> Self {
         let conditions = vec![false; scene.task.condition_names().len()];
-        let verdict = Verdict { conditions, reward: 0.0, success: false };
+        let verdict = Verdict { conditions, met: Vec::new(), reward: 0.0, success: false };
         Run { scene, monitor: Monitor::new(scene), steps: Vec::new(), seen: at_rest(scene), verdict }
     }
 
@@ -113,44 +113,40 @@ impl<'a> Run<'a> {
     }
 }
 
-/// What there is to see before the first contact is known: the arm in its ready pose, the blocks where the scene has them.
+/// What there is to see before the first contact is known: the arm in its ready pose, the objects where the scene has them.
 fn at_rest(scene: &Scene) -> Observation {
     let robot = &scene.robot;
     Observation {
         robot: Arc::clone(robot),
-        state: State { q: robot.ready, dq: Joints::zeros(robot.joints.len()), block: scene.block, context: scene.context },
+        state: scene.start(),
         tool_m: robot.tool_pose(&robot.ready).translation.vector.into(),
-        base_now: if let Context::Base(base) = scene.context { Some(base) } else { None },
-        contacts: Contacts::none(robot.fingers().len()),
-        block_speed_m_s: 0.0,
+        objects: scene.objects.iter().map(|object| Body { pose: object.pose, speed_m_s: 0.0 }).collect(),
+        contacts: Contacts::none(robot.fingers().len(), scene.objects.len()),
     }
 }
 
 fn record(seen: &Observation, verdict: &Verdict, commanded: Action, executed: Action, phase: Option<Phase>) -> Step {
     Step {
-        state: seen.state,
-        base_now: seen.base_now,
+        state: seen.state.clone(),
+        objects: seen.objects.clone(),
         commanded,
         executed,
-        contacts: seen.contacts,
-        block_speed_m_s: seen.block_speed_m_s,
+        contacts: seen.contacts.clone(),
         reward: verdict.reward,
         conditions: verdict.conditions.clone(),
         phase,
     }
 }
 
-/// Whether a block's centre is below the table's top.
+/// Whether an object's centre is below the table's top.
 pub(super) fn fallen(seen: &Observation) -> bool {
-    let base_height = seen.base_now.map_or(f64::INFINITY, |b| b.position_m[2]);
-    seen.state.block.position_m[2].min(base_height) < 0.0
+    seen.objects.iter().any(|object| object.pose.position_m[2] < 0.0)
 }
 
 /// Whether every number is one, and none is beyond what can be.
 pub(super) fn sound(seen: &Observation) -> bool {
-    let state = &seen.state;
-    let base = seen.base_now.map_or([0.0; 7], |b| b.to_array());
-    let motion = state.q.iter().chain(&state.dq).copied();
-    let motion = motion.chain(state.block.to_array()).chain(base).chain([seen.block_speed_m_s]);
-    motion.into_iter().all(|v| v.abs() <= LARGEST_NUMBER) && seen.contacts.finger_block_n.iter().all(|f| f.is_finite())
+    let objects = seen.objects.iter().flat_map(|object| object.pose.to_array().into_iter().chain([object.speed_m_s]));
+    let motion = seen.state.q.iter().chain(&seen.state.dq).copied();
+    let forces = seen.contacts.objects.iter().flat_map(|touch| touch.fingers_n.iter());
+    motion.chain(objects).all(|v| v.abs() <= LARGEST_NUMBER) && forces.copied().all(|f| f.is_finite())
 }

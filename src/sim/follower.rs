@@ -9,6 +9,7 @@ use crate::joints::Joints;
 use crate::plan::Plan;
 use crate::robot::Robot;
 use crate::state::{Action, CONTROL_DT_S};
+use crate::task::Target;
 use crate::tasks::Observation;
 use nalgebra::{Matrix6, Vector3, Vector6};
 use std::sync::Arc;
@@ -31,10 +32,12 @@ const FUNNEL_LENGTH_M: f64 = 0.10;
 const CLOSE_XY_M: f64 = 0.006;
 /// ... and this little above it \[m\].
 const CLOSE_Z_M: f64 = 0.004;
-/// Fingers open when the block is this near to its target horizontally \[m\] ...
+/// Fingers open when the object is this near to its target horizontally \[m\] ...
 const OPEN_XY_M: f64 = 0.008;
 /// ... and this little above it \[m\].
 const OPEN_Z_M: f64 = 0.004;
+/// The way up from a released object ends for the next goal when so little of it is left \[m\]: there is nothing to be exact about.
+const RETREATED_M: f64 = 0.02;
 /// The grip is firm when the fingers move slower than this share of the speed with which they close.
 const STALLED: f64 = 0.1875;
 /// The hand is open when every finger is this near to its place in the open hand \[rad, and what counts as one\].
@@ -52,9 +55,9 @@ struct Segment {
 }
 
 impl Segment {
-    fn new(plan: &Plan, phase: Phase) -> Option<Self> {
+    fn new(plan: &Plan, goal: usize, phase: Phase) -> Option<Self> {
         let robot = &plan.scene.robot;
-        let q: Vec<_> = plan.waypoints.iter().filter(|w| w.phase == phase).map(|w| w.q).collect();
+        let q: Vec<_> = plan.waypoints.iter().filter(|w| (w.goal, w.phase) == (goal, phase)).map(|w| w.q).collect();
         let tool_m: Vec<Vector3<f64>> = q.iter().map(|q| robot.tool_pose(q).translation.vector).collect();
         let mut arc_m = Vec::with_capacity(q.len());
         for (i, p) in tool_m.iter().enumerate() {
@@ -84,17 +87,52 @@ impl Segment {
     }
 }
 
+/// The part of a plan that is for one goal.
+#[derive(Clone, Debug)]
+struct Course {
+    /// The object, by its place in the task.
+    object: usize,
+    approach: Segment,
+    carry: Segment,
+    retreat: Option<Segment>,
+    /// Object's centre minus tool point at the planned grasp \[m\].
+    object_from_tool_m: Vector3<f64>,
+    /// Where the object's centre must be to let go \[m\]; `None` when the task holds it.
+    release_m: Option<Vector3<f64>>,
+    /// Another object that an earlier goal moves, on or in which this one goes, and where the plan has it \[m\].
+    support: Option<(usize, Vector3<f64>)>,
+}
+
+impl Course {
+    fn new(plan: &Plan, goal: usize) -> Option<Self> {
+        let scene = &plan.scene;
+        let object = scene.task.goals[goal].object;
+        let approach = Segment::new(plan, goal, Phase::Approach)?;
+        let carry = Segment::new(plan, goal, Phase::Carry)?;
+        let retreat = Segment::new(plan, goal, Phase::Retreat);
+        let object_from_tool_m = Vector3::from(scene.objects[object].pose.position_m) - carry.tool_m[0];
+        let release_m = retreat.is_some().then(|| Vector3::from(scene.target_m(goal)));
+        let support = match scene.task.goals[goal].target {
+            Target::On(other) | Target::In(other) if scene.task.goal_of(other).is_some() => {
+                Some((other, scene.place_after(other, goal).into()))
+            }
+            _ => None,
+        };
+        Some(Course { object, approach, carry, retreat, object_from_tool_m, release_m, support })
+    }
+
+    /// How far the object's target is from where the plan has it \[m\]: it stands on what was put there just now.
+    fn astray_m(&self, seen: &Observation) -> Vector3<f64> {
+        self.support.map_or_else(Vector3::zeros, |(other, planned)| Vector3::from(seen.at(other)) - planned)
+    }
+}
+
 /// Follows one plan.
 #[derive(Clone, Debug)]
 pub struct Follower {
     robot: Arc<Robot>,
-    approach: Segment,
-    carry: Segment,
-    retreat: Option<Segment>,
-    /// Block centre minus tool point at the planned grasp \[m\].
-    block_from_tool_m: Vector3<f64>,
-    /// Where the block's centre must be to let go \[m\]; `None` when the task holds it.
-    release_m: Option<Vector3<f64>>,
+    courses: Vec<Course>,
+    goal: usize,
     phase: Phase,
     reached: usize,
 }
@@ -103,12 +141,8 @@ impl Follower {
     /// A follower at the start of `plan`; `None` if the plan lacks a phase that its task needs.
     pub fn new(plan: &Plan) -> Option<Self> {
         let robot = Arc::clone(&plan.scene.robot);
-        let approach = Segment::new(plan, Phase::Approach)?;
-        let carry = Segment::new(plan, Phase::Carry)?;
-        let retreat = Segment::new(plan, Phase::Retreat);
-        let block_from_tool_m = Vector3::from(plan.scene.block.position_m) - carry.tool_m[0];
-        let release_m = retreat.is_some().then(|| Vector3::from(plan.scene.target_m()));
-        Some(Follower { robot, approach, carry, retreat, block_from_tool_m, release_m, phase: Phase::Approach, reached: 0 })
+        let courses = (0..plan.scene.task.goals.len()).map(|goal| Course::new(plan, goal)).collect::<Option<Vec<_>>>()?;
+        Some(Follower { robot, courses, goal: 0, phase: Phase::Approach, reached: 0 })
     }
 
     fn enter(&mut self, phase: Phase) {
@@ -119,22 +153,23 @@ impl Follower {
     /// Moves on to the next phase when the state says so.
     fn switch(&mut self, seen: &Observation) {
         let tool = Vector3::from(seen.tool_m);
+        let course = &self.courses[self.goal];
         match self.phase {
             Phase::Approach => {
-                let off = tool - self.approach.tool_m[self.approach.last()];
+                let off = tool - course.approach.tool_m[course.approach.last()];
                 if off.xy().norm() < CLOSE_XY_M && off.z < CLOSE_Z_M {
                     self.enter(Phase::Close);
                 }
             }
             Phase::Close => {
                 let stalled = STALLED * self.robot.finger_speed;
-                if seen.gripped() && seen.state.dq[self.robot.arm..].iter().all(|v| v.abs() < stalled) {
+                if seen.gripped(course.object) && seen.state.dq[self.robot.arm..].iter().all(|v| v.abs() < stalled) {
                     self.enter(Phase::Carry);
                 }
             }
             Phase::Carry => {
-                let block = Vector3::from(seen.state.block.position_m);
-                if self.release_m.is_some_and(|to| (block - to).xy().norm() < OPEN_XY_M && block.z - to.z < OPEN_Z_M) {
+                let object = Vector3::from(seen.at(course.object)) - course.astray_m(seen);
+                if course.release_m.is_some_and(|to| (object - to).xy().norm() < OPEN_XY_M && object.z - to.z < OPEN_Z_M) {
                     self.enter(Phase::Open);
                 }
             }
@@ -143,7 +178,14 @@ impl Follower {
                     self.enter(Phase::Retreat);
                 }
             }
-            Phase::Retreat => {}
+            Phase::Retreat => {
+                let left = |retreat: &Segment| retreat.arc_m[retreat.last()] - retreat.arc_m[self.reached];
+                let away = course.retreat.as_ref().is_some_and(|retreat| left(retreat) < RETREATED_M);
+                if away && self.goal + 1 < self.courses.len() {
+                    self.goal += 1;
+                    self.enter(Phase::Approach);
+                }
+            }
         }
     }
 
@@ -175,29 +217,32 @@ impl Controller for Follower {
         let q = &seen.state.q;
         let tool = Vector3::from(seen.tool_m);
         let still = Vector3::zeros();
-        let arm = match self.phase {
+        let course = &self.courses[self.goal];
+        let (arm, reached) = match self.phase {
             Phase::Approach => {
-                self.reached = self.approach.project(&tool, self.reached);
-                let from = self.approach.funnel(self.reached, &tool);
-                self.steer(&self.approach, from, q, &still)
+                let reached = course.approach.project(&tool, self.reached);
+                let from = course.approach.funnel(reached, &tool);
+                (self.steer(&course.approach, from, q, &still), reached)
             }
-            Phase::Close => self.steer(&self.approach, self.approach.last(), q, &still),
+            Phase::Close => (self.steer(&course.approach, course.approach.last(), q, &still), self.reached),
             Phase::Carry => {
-                // Steer the block, not the hand: the grasp is never exactly where it was planned.
-                let virtual_tool = Vector3::from(seen.state.block.position_m) - self.block_from_tool_m;
-                self.reached = self.carry.project(&virtual_tool, self.reached);
-                let from = if self.release_m.is_some() { self.carry.funnel(self.reached, &virtual_tool) } else { self.reached };
-                self.steer(&self.carry, from, q, &(tool - virtual_tool))
+                // Steer the object, not the hand: the grasp is never exactly where it was planned.
+                let astray = course.astray_m(seen);
+                let virtual_tool = Vector3::from(seen.at(course.object)) - course.object_from_tool_m - astray;
+                let reached = course.carry.project(&virtual_tool, self.reached);
+                let from = if course.release_m.is_some() { course.carry.funnel(reached, &virtual_tool) } else { reached };
+                (self.steer(&course.carry, from, q, &(tool - virtual_tool)), reached)
             }
-            Phase::Open => Joints::zeros(self.robot.arm),
-            Phase::Retreat => match &self.retreat {
+            Phase::Open => (Joints::zeros(self.robot.arm), self.reached),
+            Phase::Retreat => match &course.retreat {
                 Some(retreat) => {
-                    self.reached = retreat.project(&tool, self.reached);
-                    self.steer(retreat, self.reached, q, &still)
+                    let reached = retreat.project(&tool, self.reached);
+                    (self.steer(retreat, reached, q, &still), reached)
                 }
-                None => Joints::zeros(self.robot.arm),
+                None => (Joints::zeros(self.robot.arm), self.reached),
             },
         };
+        self.reached = reached;
         let robot = &self.robot;
         let finger = |joint: usize| {
             let closing = robot.finger_speed * robot.closing_way(joint - robot.arm).signum();

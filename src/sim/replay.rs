@@ -9,10 +9,10 @@ use crate::interrupt::Interrupt;
 use crate::joints::Joints;
 use crate::pulse::Pulse;
 use crate::robot::Robot;
-use crate::scene::Scene;
+use crate::scene::{Placed, Scene};
 use crate::seed::stream;
-use crate::state::{Action, State};
-use crate::tasks::{Observation, Task};
+use crate::state::{Action, Pose, State};
+use crate::tasks::{Observation, Task, bodies};
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 use std::sync::Arc;
@@ -59,7 +59,7 @@ impl Excitation<'_> {
 /// [`crate::error::Error::Interrupted`].
 pub fn reexecute(
     index: u64,
-    (robot, task, demo): (&Arc<Robot>, Task, &Demo),
+    (robot, task, demo): (&Arc<Robot>, &Arc<Task>, &Demo),
     scene: &SceneSettings,
     settings: &SimulateSettings,
     fingers: &FingerPulses,
@@ -67,14 +67,14 @@ pub fn reexecute(
     interrupt: &Interrupt,
 ) -> Result<Episode> {
     let start = State::from_row(task, robot.joints.len(), demo.state(0)).expect("a demo of the task has rows of its length");
+    let bodies = bodies(task, scene, &mut rng);
+    let placed = |(pose, [friction, mass_kg]): (Pose, [f64; 2])| Placed { pose, friction, mass_kg };
     let scene = Scene {
         robot: Arc::clone(robot),
-        task,
-        block: start.block,
-        context: start.context,
+        task: Arc::clone(task),
+        objects: start.objects.into_iter().zip(bodies).map(placed).collect(),
+        goals: start.goals,
         obstacles: scene.obstacles.clone(),
-        friction: scene.friction.draw(&mut rng),
-        block_mass_kg: scene.block_mass_kg.draw(&mut rng),
     };
     let excitation = || {
         let rng = stream(rng.random(), "reexecute.fingers", index);

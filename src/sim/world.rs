@@ -1,55 +1,50 @@
-//! One arm, a table, a block, perhaps a base block and obstacles, in rapier.
+//! One arm, a table, the objects of a task and obstacles, in rapier.
 
 use super::arm::{self, SURFACE_FRICTION};
 use super::contacts::{self, Owner};
-use super::convert::{pose, to_pose, vector};
+use super::convert::{isometry, pose, to_pose, vector};
 use super::physics::{Grain, Physics};
+use crate::demo::Body;
 use crate::error::{Error, Result};
-use crate::joints::Joints;
 use crate::robot::Robot;
-use crate::scene::{BLOCK_EDGE_M, Scene};
-use crate::state::{Action, Context, Pose, State};
+use crate::scene::{Placed, Scene};
+use crate::state::{Action, State};
+use crate::task::{Shape, Task};
 use crate::tasks::Observation;
-use nalgebra::Isometry3;
+use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 use rapier3d::prelude::*;
-use serde::{Deserialize, Serialize};
+use serde::Serialize;
+use std::f64::consts::FRAC_PI_2;
 use std::sync::Arc;
 
 /// Gravity \[m/s^2\].
 const GRAVITY_M_S2: Real = 9.81;
 /// Half extents of the table, a box whose top is the plane z = 0 \[m\]: beyond the arm's reach, too thick to fall through.
 const TABLE_HALF_M: [f64; 3] = [1.5, 1.5, 0.25];
-/// A block that moves slower rests \[m/s\].
+/// An object that moves slower rests \[m/s\].
 const REST_M_S: Real = 0.005;
 
 /// The simulated scene. Stepping it depends on nothing but its own state and the actions.
-#[derive(Serialize, Deserialize)]
 pub struct World {
     scene: Scene,
     settings: Physics,
     physics: PhysicsWorld,
     handle: MultibodyJointHandle,
-    block: RigidBodyHandle,
-    base: Option<RigidBodyHandle>,
-    /// Quaternion x y z w of the last observed block: the next keeps its sign.
-    block_quaternion: [f64; 4],
+    /// Of each object of the task.
+    objects: Vec<RigidBodyHandle>,
+    /// Quaternions x y z w of the objects when they were last observed: the next keep their signs.
+    quaternions: Vec<[f64; 4]>,
 }
 
 impl World {
-    /// The start of an episode: the arm at rest in its ready pose, block and base block standing where the scene has them.
+    /// The start of an episode: the arm at rest in its ready pose, the objects standing where the scene has them.
     pub fn new(scene: &Scene) -> World {
         World::with(scene, Physics::default())
     }
 
     /// The same under other settings of the physics.
     pub fn with(scene: &Scene, settings: Physics) -> World {
-        let start = State {
-            q: scene.robot.ready,
-            dq: Joints::zeros(scene.robot.joints.len()),
-            block: scene.block,
-            context: scene.context,
-        };
-        World::at(scene, &start, settings)
+        World::at(scene, &scene.start(), settings)
     }
 
     fn at(scene: &Scene, state: &State, settings: Physics) -> World {
@@ -60,16 +55,15 @@ impl World {
         for obstacle in &scene.obstacles {
             insert_fixed(&mut physics, Owner::Obstacle, obstacle.center_m, obstacle.size_m.map(|s| s / 2.0));
         }
-        let block = insert_cube(&mut physics, Owner::Block, &state.block, scene);
-        let base = match state.context {
-            Context::Base(base) => Some(insert_cube(&mut physics, Owner::Base, &base, scene)),
-            Context::None | Context::Goal(_) => None,
-        };
+        let placed = scene.objects.iter().zip(&state.objects).map(|(object, pose)| Placed { pose: *pose, ..*object });
+        let objects = scene.task.objects.iter().zip(placed).enumerate();
+        let objects = objects.map(|(i, (object, placed))| insert_object(&mut physics, i, &object.shape, &placed)).collect();
         let handle = arm::insert(&mut physics, &scene.robot, &state.q, &state.dq);
         // A step of no duration finds the contacts and moves nothing.
         physics.step();
         physics.integration_parameters = settings.parameters(settings.near);
-        World { scene: scene.clone(), settings, physics, handle, block, base, block_quaternion: state.block.quaternion_xyzw }
+        let quaternions = state.objects.iter().map(|pose| pose.quaternion_xyzw).collect();
+        World { scene: scene.clone(), settings, physics, handle, objects, quaternions }
     }
 
     /// One control step of 50 ms with the joint velocities `executed` \[rad/s, m/s\] (used in f32).
@@ -86,27 +80,34 @@ impl World {
     fn grain(&self) -> Grain {
         let Physics { near, free, .. } = self.settings;
         let moves = |handle: &RigidBodyHandle| self.physics.bodies[*handle].linvel().length() > REST_M_S;
-        let near_all = near == free || contacts::robot_near(&self.physics) || self.base.iter().chain([&self.block]).any(moves);
+        let near_all = near == free || contacts::robot_near(&self.physics) || self.objects.iter().any(moves);
         if near_all { near } else { free }
     }
 
     /// What there is to see now. Forces are those of the physics step that led here (0 in a world that was just made or set).
     pub fn observe(&mut self) -> Observation {
         let (q, dq) = arm::read(&self.physics, &self.scene.robot, self.handle);
-        let body = &self.physics.bodies[self.block];
-        let mut block = to_pose(body.position());
-        let agreement: f64 = block.quaternion_xyzw.iter().zip(&self.block_quaternion).map(|(a, b)| a * b).sum();
-        if agreement < 0.0 {
-            block.quaternion_xyzw = block.quaternion_xyzw.map(|v| -v);
+        let mut objects = Vec::with_capacity(self.objects.len());
+        for (handle, before) in self.objects.iter().zip(&mut self.quaternions) {
+            let body = &self.physics.bodies[*handle];
+            let mut pose = to_pose(body.position());
+            let agreement: f64 = pose.quaternion_xyzw.iter().zip(&*before).map(|(a, b)| a * b).sum();
+            if agreement < 0.0 {
+                pose.quaternion_xyzw = pose.quaternion_xyzw.map(|v| -v);
+            }
+            *before = pose.quaternion_xyzw;
+            objects.push(Body { pose, speed_m_s: f64::from(body.linvel().length()) });
         }
-        self.block_quaternion = block.quaternion_xyzw;
+        // What no goal moves is seen where it stood at the start.
+        let moved = self.scene.task.moved();
+        let mut state = State { q, dq, ..self.scene.start() };
+        state.objects.iter_mut().zip(&objects).take(moved).for_each(|(seen, now)| *seen = now.pose);
         Observation {
             robot: Arc::clone(&self.scene.robot),
-            state: State { q, dq, block, context: self.scene.context },
+            state,
             tool_m: self.scene.robot.tool_pose(&q).translation.vector.into(),
-            base_now: self.base.map(|handle| to_pose(self.physics.bodies[handle].position())),
-            contacts: contacts::read(&self.physics, &self.scene.robot),
-            block_speed_m_s: f64::from(body.linvel().length()),
+            objects,
+            contacts: contacts::read(&self.physics, &self.scene.robot, self.objects.len()),
         }
     }
 
@@ -115,17 +116,22 @@ impl World {
         self.scene.robot.link_poses(&arm::read(&self.physics, &self.scene.robot, self.handle).0)
     }
 
-    /// Puts the world into a recorded state: exact in joint angles, joint velocities and block pose. The block is at rest, the base
-    /// block stands where the state's context has it, and contacts start without force: in the middle of a grasp the future
+    /// Puts the world into a recorded state: exact in joint angles, joint velocities and poses. The objects are at rest, those
+    /// that no goal moves stand where the state has them, and contacts start without force: in the middle of a grasp the future
     /// differs from the recorded one by about half a millimetre.
     pub fn set_state(&mut self, state: &State) {
-        let scene = Scene { context: state.context, ..self.scene.clone() };
+        let placed = self.scene.at(state).objects;
+        let mut scene = Scene { goals: state.goals.clone(), ..self.scene.clone() };
+        let moved = scene.task.moved();
+        scene.objects[moved..].copy_from_slice(&placed[moved..]);
         *self = World::at(&scene, state, self.settings);
     }
 
     /// Everything that the future depends on, as bytes.
     pub fn snapshot(&self) -> Vec<u8> {
-        postcard::to_stdvec(&(&self.scene.robot, self)).expect("the world is plain data")
+        let scene = [json(&*self.scene.robot), json(&*self.scene.task), self.scene.to_json().to_string()];
+        let moving = (&self.settings, &self.physics, &self.handle, &self.objects, &self.quaternions);
+        postcard::to_stdvec(&(scene, moving)).expect("the world is plain data")
     }
 
     /// The world of a [`World::snapshot`]; it continues bit for bit.
@@ -133,12 +139,22 @@ impl World {
     /// # Errors
     /// [`Error::Failed`] when the bytes are no snapshot of this version.
     pub fn restore(bytes: &[u8]) -> Result<World> {
-        let (robot, mut world): (Arc<Robot>, World) = postcard::from_bytes(bytes).map_err(|e| {
-            Error::Failed(format!("{} bytes are no snapshot of a world by this version of hilt: {e}", bytes.len()))
-        })?;
-        world.scene.robot = robot;
-        Ok(world)
+        let refuse = |why: String| {
+            Error::Failed(format!("{} bytes are no snapshot of a world by this version of hilt: {why}", bytes.len()))
+        };
+        type Moving = (Physics, PhysicsWorld, MultibodyJointHandle, Vec<RigidBodyHandle>, Vec<[f64; 4]>);
+        let (scene, moving): ([String; 3], Moving) = postcard::from_bytes(bytes).map_err(|e| refuse(e.to_string()))?;
+        let [robot, task, scene] = scene;
+        let robot: Robot = serde_json::from_str(&robot).map_err(|e| refuse(e.to_string()))?;
+        let task: Task = serde_json::from_str(&task).map_err(|e| refuse(e.to_string()))?;
+        let scene = Scene::from_json(&Arc::new(robot), &Arc::new(task), &scene).map_err(refuse)?;
+        let (settings, physics, handle, objects, quaternions) = moving;
+        Ok(World { scene, settings, physics, handle, objects, quaternions })
     }
+}
+
+fn json(value: &impl Serialize) -> String {
+    serde_json::to_string(value).expect("plain data with text keys")
 }
 
 fn insert_fixed(physics: &mut PhysicsWorld, owner: Owner, center_m: [f64; 3], half_m: [f64; 3]) {
@@ -151,36 +167,38 @@ fn insert_fixed(physics: &mut PhysicsWorld, owner: Owner, center_m: [f64; 3], ha
     physics.insert(RigidBodyBuilder::fixed(), collider);
 }
 
-fn insert_cube(physics: &mut PhysicsWorld, owner: Owner, at: &Pose, scene: &Scene) -> RigidBodyHandle {
-    let half = (BLOCK_EDGE_M / 2.0) as Real;
-    // The block's friction multiplies that of whatever it touches, which is 1: it holds against everything.
-    let friction = if owner == Owner::Block { scene.friction as Real } else { SURFACE_FRICTION };
-    let collider = ColliderBuilder::cuboid(half, half, half)
-        .mass(scene.block_mass_kg as Real)
-        .friction(friction)
-        .friction_combine_rule(CoefficientCombineRule::Multiply)
-        .restitution(0.0)
-        .user_data(owner.code());
-    physics.insert(RigidBodyBuilder::dynamic().pose(pose(at)).can_sleep(false), collider).0
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::config::SceneSettings;
-    use crate::robot::file::built_in::paper_robot;
-    use crate::tasks::{Task, draw_scene};
-
-    #[test]
-    fn the_table_carries_the_weight_of_the_block() {
-        let settings = SceneSettings::default();
-        let scene =
-            draw_scene(&paper_robot(), Task::PickUp, &settings, &mut crate::seed::stream(0, "weight", 0)).expect("there is room");
-        let mut world = World::new(&scene);
-        (0..20).for_each(|_| world.step(&[0.0; 9].into()));
-        let block = world.physics.bodies[world.block].colliders()[0];
-        let force: f64 = world.physics.contact_pairs_with(block).map(|pair| contacts::force_n(pair, &world.physics)).sum();
-        let weight = scene.block_mass_kg * f64::from(GRAVITY_M_S2);
-        assert!((force - weight).abs() < 0.02 * weight, "the table pushes with {force} N against {weight} N");
+/// An object of the task. Its friction multiplies that of whatever it touches, which is 1 of all but objects: it holds against everything.
+fn insert_object(physics: &mut PhysicsWorld, number: usize, shape: &Shape, at: &Placed) -> RigidBodyHandle {
+    let builder = if shape.is_fixed() { RigidBodyBuilder::fixed() } else { RigidBodyBuilder::dynamic().can_sleep(false) };
+    let finish = |collider: ColliderBuilder| {
+        collider
+            .friction(at.friction as Real)
+            .friction_combine_rule(CoefficientCombineRule::Multiply)
+            .restitution(0.0)
+            .user_data(Owner::Object(number).code())
+    };
+    let cuboid = |half_m: [f64; 3]| {
+        let half = vector(half_m);
+        ColliderBuilder::cuboid(half.x, half.y, half.z)
+    };
+    let body = physics.insert_body(builder.pose(pose(&at.pose)));
+    let mass = at.mass_kg as Real;
+    match *shape {
+        Shape::Box(size) => {
+            physics.insert_collider(finish(cuboid(size.map(|edge| edge / 2.0)).mass(mass)), Some(body));
+        }
+        Shape::Cylinder { radius_m, height_m } => {
+            // Rapier's cylinders stand along y.
+            let upright = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), FRAC_PI_2);
+            let upright = isometry(&Isometry3::from_parts(Translation3::identity(), upright));
+            let cylinder = ColliderBuilder::cylinder((height_m / 2.0) as Real, radius_m as Real).position(upright);
+            physics.insert_collider(finish(cylinder.mass(mass)), Some(body));
+        }
+        Shape::Bin { .. } => {
+            for (center_m, half_m) in shape.boxes_m() {
+                physics.insert_collider(finish(cuboid(half_m).translation(vector(center_m))), Some(body));
+            }
+        }
     }
+    body
 }

@@ -1,12 +1,13 @@
 //! What the rows of a robot's states and actions in a task hold.
 
-use super::{REST_HEIGHT_M, Task};
+use super::Task;
 use crate::demo::{Demo, Episode, Step};
 use crate::layout::{Aim, Chain, Frame, Holds, Layout, Span};
 use crate::robot::Robot;
 use crate::robot::file::built_in::paper_robot;
 use crate::robot::model::Joint;
 use crate::state::{Action, CONTROL_DT_S};
+use crate::task::{Goal, Target, built_in};
 use nalgebra::Isometry3;
 use serde_json::{Value, json};
 use std::ops::Range;
@@ -17,7 +18,7 @@ const POSE: [&str; 7] = ["x_m", "y_m", "z_m", "qx", "qy", "qz", "qw"];
 
 impl Task {
     /// What the rows of this robot in this task hold.
-    pub fn layout(self, robot: &Robot) -> Arc<Layout> {
+    pub fn layout(&self, robot: &Robot) -> Arc<Layout> {
         Arc::new(layout(self, robot))
     }
 }
@@ -37,14 +38,14 @@ impl Episode {
 
 /// The description of a network as this version has it: those of older ones name the task, and leave its layout unsaid, which is that of the paper's robot.
 pub fn with_layout(mut description: Value) -> Value {
-    let task = description.get("task").and_then(Value::as_str).and_then(|name| name.parse::<Task>().ok());
+    let task = description.get("task").and_then(Value::as_str).and_then(|name| built_in::find(name).ok());
     if let (Some(task), None) = (task, description.get("layout")) {
         description["layout"] = json!(*task.layout(&paper_robot()));
     }
     description
 }
 
-fn layout(task: Task, robot: &Robot) -> Layout {
+fn layout(task: &Task, robot: &Robot) -> Layout {
     // `q_rad` of joints that turn, `q_m` of those that slide.
     let of_joints = |name: &str, holds, entry: fn(&Joint) -> String, which: Range<usize>| Span {
         name: name.into(),
@@ -60,23 +61,30 @@ fn layout(task: Task, robot: &Robot) -> Layout {
     let mut state = vec![
         of_joints("q", Holds::JointPositions, Joint::position_name, all.clone()),
         of_joints("dq", Holds::JointVelocities, Joint::velocity_name, all),
-        of_body("block", Holds::Pose, &POSE),
     ];
-    // A block on the base block is as far above it as two that rest on the table are high.
-    let aim = match task {
-        Task::PickUp => None,
-        Task::PickAndPlace => Some((of_body("goal", Holds::FixedPoint, &POSE[..3]), 0.0)),
-        Task::Stack => Some((of_body("base", Holds::FixedPose, &POSE), 2.0 * REST_HEIGHT_M)),
+    for (i, object) in task.objects.iter().enumerate() {
+        let holds = if i < task.moved() { Holds::Pose } else { Holds::FixedPose };
+        state.push(of_body(&object.name, holds, &POSE));
+    }
+    let goals = task.goal_names();
+    state.extend(goals.iter().map(|name| of_body(name, Holds::FixedPoint, &POSE[..3])));
+    let aim = |(k, goal): (usize, &Goal)| {
+        let (object, other) = (&task.objects[goal.object], |i: usize| &task.objects[i]);
+        let (target, up_m) = match &goal.target {
+            Target::Lift { .. } => return None,
+            Target::At { .. } => (&goals[task.place_number(k)?], 0.0),
+            // Centre on centre, the two halves apart.
+            Target::On(base) => (&other(*base).name, other(*base).rest_m() + object.rest_m()),
+            Target::In(bin) => (&other(*bin).name, object.rest_m() - other(*bin).rest_m()),
+        };
+        Some(Aim { object: object.name.clone(), target: target.clone(), offset_m: [0.0, 0.0, up_m] })
     };
-    let to =
-        |(target, up_m): &(Span, f64)| Aim { object: "block".into(), target: target.name.clone(), offset_m: [0.0, 0.0, *up_m] };
-    let aims = aim.iter().map(to).collect();
-    state.extend(aim.map(|(span, _)| span));
+    let aims = task.goals.iter().enumerate().filter_map(aim).collect();
     let closing = |i: usize| robot.closing_way(i).signum();
     let sign = |i: usize| if i < robot.arm { 1.0 } else { closing(i - robot.arm) };
     let units: Vec<f64> = robot.joints.iter().enumerate().map(|(i, joint)| joint.per_radian() * sign(i)).collect();
     Layout {
-        name: task.name().into(),
+        name: task.name.clone(),
         period_s: CONTROL_DT_S,
         state,
         action: vec![

@@ -1,48 +1,62 @@
-//! What a task is: scene, spawn area, named success conditions, milestones of the reward and a dense one, failure classes. One file a task.
+//! What follows from a task's file: scene, named success conditions, milestones of the reward and a dense one, failure classes, layout. One
+//! file a kind of goal.
 
+mod goal;
+mod inside;
 mod layout;
+mod lift;
 mod monitor;
 mod observation;
-pub mod pick_and_place;
-pub mod pick_up;
+mod on;
+mod place;
 mod reward;
 mod spawn;
-pub mod stack;
 
 pub use crate::task::{FailureClass, Task};
+pub use goal::Kind;
 pub use layout::with_layout;
 pub use monitor::{Monitor, Verdict};
 pub use observation::Observation;
+pub use on::ALIGNED_M;
+pub use place::MIN_TRAVEL_M;
 pub use reward::dense;
-pub use spawn::{REST_HEIGHT_M, draw_scene};
+pub use spawn::{bodies, draw_scene};
 
-use crate::scene::{BLOCK_EDGE_M, Scene};
-use crate::state::Context;
+use crate::scene::Scene;
+use crate::state::Pose;
+
+/// Conditions of every goal before those of its kind.
+const ON_THE_WAY: [&str; 3] = ["reached", "grasped", "lifted"];
 
 impl Task {
-    /// Names of the conditions that are recorded: what has happened so far, then what must hold at once for 0.5 s.
-    pub fn condition_names(self) -> &'static [&'static str] {
-        match self {
-            Task::PickUp => &pick_up::CONDITIONS,
-            Task::PickAndPlace => &pick_and_place::CONDITIONS,
-            Task::Stack => &stack::CONDITIONS,
-        }
+    /// Names of the conditions that are recorded, goal after goal: what has happened so far, then what must hold at once for 0.5 s. Of
+    /// several goals they begin with the object's name.
+    pub fn condition_names(&self) -> Vec<String> {
+        let of = |k: usize| {
+            let prefix =
+                if self.goals.len() > 1 { format!("{}.", self.objects[self.goals[k].object].name) } else { String::new() };
+            ON_THE_WAY.iter().chain(self.goals[k].kind().conditions()).map(move |name| format!("{prefix}{name}"))
+        };
+        (0..self.goals.len()).flat_map(of).collect()
     }
 }
 
 impl Scene {
-    /// Where the block's centre must end: above the start (pick-up), the goal, or on top of the base block \[m\].
-    pub fn target_m(&self) -> [f64; 3] {
-        match self.context {
-            Context::None => {
-                let [x, y, _] = self.block.position_m;
-                [x, y, pick_up::TARGET_HEIGHT_M]
-            }
-            Context::Goal(goal) => goal,
-            Context::Base(base) => {
-                let [x, y, z] = base.position_m;
-                [x, y, z + BLOCK_EDGE_M]
-            }
+    /// Where the centre of the object of a goal must end \[m\].
+    pub fn target_m(&self, goal: usize) -> [f64; 3] {
+        self.task.goals[goal].kind().target_m(self, goal)
+    }
+
+    /// Where an object is when the goals before `goal` hold \[m\].
+    pub fn place_after(&self, object: usize, goal: usize) -> [f64; 3] {
+        match self.task.goal_of(object).filter(|before| *before < goal) {
+            Some(before) => self.target_m(before),
+            None => self.objects[object].pose.position_m,
         }
     }
+}
+
+/// Turn about the vertical \[rad\].
+fn yaw_of(pose: &Pose) -> f64 {
+    pose.isometry().rotation.euler_angles().2
 }

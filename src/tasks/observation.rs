@@ -1,12 +1,12 @@
 //! What there is to see of a moment.
 
-use crate::demo::Contacts;
+use crate::demo::{Body, Contacts};
 use crate::robot::Robot;
-use crate::state::{Pose, State};
+use crate::state::State;
 use nalgebra::Vector3;
 use std::sync::Arc;
 
-/// A finger presses when its normal force on the block exceeds this \[N\]; the block weighs about 1 N.
+/// A finger presses when its normal force on the object exceeds this \[N\]; the block weighs about 1 N.
 const PRESS_N: f64 = 0.05;
 /// At rest below this speed \[m/s\].
 pub(super) const REST_SPEED_M_S: f64 = 0.01;
@@ -20,27 +20,35 @@ pub struct Observation {
     pub state: State,
     /// Tool point in the world \[m\].
     pub tool_m: [f64; 3],
-    /// Pose of the base block now, if there is one.
-    pub base_now: Option<Pose>,
+    /// The task's objects now.
+    pub objects: Vec<Body>,
     /// Contacts now.
     pub contacts: Contacts,
-    /// Speed of the block's centre \[m/s\].
-    pub block_speed_m_s: f64,
 }
 
 impl Observation {
-    /// Distance of the block's centre to `target` \[m\].
-    pub fn block_to(&self, target_m: [f64; 3]) -> f64 {
-        (Vector3::from(self.state.block.position_m) - Vector3::from(target_m)).norm()
+    /// Where an object's centre is now \[m\].
+    pub fn at(&self, object: usize) -> [f64; 3] {
+        self.objects[object].pose.position_m
     }
 
-    /// Whether no finger touches the block.
-    pub fn released(&self) -> bool {
-        self.contacts.finger_block_n.iter().all(|f| *f <= 0.0)
+    /// Distance of an object's centre to `target` \[m\].
+    pub fn distance(&self, object: usize, target_m: [f64; 3]) -> f64 {
+        (Vector3::from(self.at(object)) - Vector3::from(target_m)).norm()
     }
 
-    /// Whether two fingers that oppose each other press the block.
-    pub fn gripped(&self) -> bool {
-        self.robot.grips(|finger| self.contacts.finger_block_n[finger] > PRESS_N)
+    /// Whether no finger touches an object.
+    pub fn released(&self, object: usize) -> bool {
+        self.contacts.objects[object].fingers_n.iter().all(|f| *f <= 0.0)
+    }
+
+    /// Whether two fingers that oppose each other press an object.
+    pub fn gripped(&self, object: usize) -> bool {
+        self.robot.grips(|finger| self.contacts.objects[object].fingers_n[finger] > PRESS_N)
+    }
+
+    /// Whether an object is at rest.
+    pub fn rests(&self, object: usize) -> bool {
+        self.objects[object].speed_m_s < REST_SPEED_M_S
     }
 }

@@ -31,7 +31,7 @@ pub fn contents(path: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
 
 /// A provenance with nested settings.
 pub fn provenance(stage: &str, task: Task) -> Provenance {
-    let mut made = Provenance::new(stage, task, json!({ "noise_variance": 0.001, "pulses": { "steps": 4 } }), 7);
+    let mut made = Provenance::new(stage, task.name(), json!({ "noise_variance": 0.001, "pulses": { "steps": 4 } }), 7);
     made.inputs.insert("plans.parquet".into(), "ab".repeat(32));
     made
 }

@@ -52,7 +52,7 @@ pub fn collect(checked: &Checked, contents: &Contents, context: &Context) -> Res
     let row = |row: &Row| {
         let Row { run, summary, .. } = row;
         let [low, high] = summary.wilson_95.map(|v| 100.0 * v);
-        let name = [run.task.name(), &run.preset, &run.variation, run.method.name()].map(String::from);
+        let name = [&run.task, &run.preset, &run.variation, run.method.name()].map(String::from);
         let counts =
             [run.seed.to_string(), format!("{} of {}", summary.successes, summary.episodes), format!("{low:.1} to {high:.1} %")];
         name.into_iter().chain(counts).collect()

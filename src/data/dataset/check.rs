@@ -8,7 +8,7 @@ use crate::error::{Error, Result};
 use crate::layout::Layout;
 use crate::robot::file::built_in::paper_robot;
 use crate::state::CONTROL_HZ;
-use crate::task::Task;
+use crate::task::built_in;
 use serde::Deserialize;
 use serde_json::Value;
 use std::collections::BTreeMap;
@@ -25,7 +25,8 @@ pub(super) const DESCRIPTION: Format = Format {
 
 /// `meta/info.json`, as far as hilt reads it.
 pub(super) struct Info {
-    pub(super) task: Task,
+    /// The task's name.
+    pub(super) task: String,
     pub(super) layout: Arc<Layout>,
     pub(super) fps: u32,
     pub(super) episodes: usize,
@@ -60,7 +61,7 @@ pub(super) fn info(root: &Path) -> Result<Info> {
     }
     let counts: Counts = serde_json::from_value(value.clone()).map_err(invalid)?;
     let found = json_file::provenance_of(&path, value.get(provenance::KEY).cloned())?;
-    let layout = layout(&path, found.task, &value)?;
+    let layout = layout(&path, &found.task, &value)?;
     check_features(&path, &layout, value.get("features"))?;
     if counts.fps != CONTROL_HZ {
         return Err(Error::input(&path, format!("has {} frames per second, hilt works at {CONTROL_HZ}", counts.fps)));
@@ -70,7 +71,7 @@ pub(super) fn info(root: &Path) -> Result<Info> {
     let files: BTreeMap<String, String> = serde_json::from_value(files).map_err(invalid)?;
     let Counts { fps, total_episodes: episodes, total_frames: frames } = counts;
     let hash = ContentHash::of(&bytes);
-    Ok(Info { task: found.task, layout, fps, episodes, frames, provenance: found, files, hash })
+    Ok(Info { task: found.task.clone(), layout, fps, episodes, frames, provenance: found, files, hash })
 }
 
 fn no_dataset(root: &Path) -> String {
@@ -85,13 +86,14 @@ fn no_dataset(root: &Path) -> String {
 }
 
 /// What its rows hold; a dataset that does not say is of the paper's robot, when there was no other.
-fn layout(path: &Path, task: Task, value: &Value) -> Result<Arc<Layout>> {
+fn layout(path: &Path, task: &str, value: &Value) -> Result<Arc<Layout>> {
     let Some(said) = value.get(provenance::KEY).and_then(|hilt| hilt.get(LAYOUT)) else {
-        return Ok(task.layout(&paper_robot()));
+        let known = built_in::find(task).map_err(|why| Error::input(path, format!("does not say its layout: {why}")))?;
+        return Ok(known.layout(&paper_robot()));
     };
     let layout: Layout =
         serde_json::from_value(said.clone()).map_err(|e| Error::input(path, format!("its layout cannot be read: {e}")))?;
-    if layout.name != task.name() {
+    if layout.name != task {
         return Err(Error::input(path, format!("its layout is of {}, its provenance of {task}", layout.name)));
     }
     layout.check().map_err(|why| Error::input(path, format!("its layout cannot be: {why}")))?;

@@ -24,7 +24,7 @@ pub(super) struct Row {
 
 /// The table as it is written.
 pub(super) struct EpisodeTable<'a> {
-    task: Task,
+    task: &'a Task,
     features: &'a [Feature],
     encoder: Encoder,
     files: Series<'a>,
@@ -41,7 +41,7 @@ impl<'a> EpisodeTable<'a> {
     /// An empty one below `dir`.
     pub(super) fn new(
         dir: &'a Path,
-        task: Task,
+        task: &'a Task,
         features: &'a [Feature],
         provenance: &'a Provenance,
         sizes: Sizes,
@@ -89,7 +89,7 @@ impl<'a> EpisodeTable<'a> {
 
 /// The columns of a row group, after so many `episodes` and `frames` in others; it goes into the file at `here`.
 fn columns(
-    task: Task,
+    task: &Task,
     features: &[Feature],
     rows: &[(Place, Row)],
     (episodes, frames): (usize, usize),
@@ -99,7 +99,7 @@ fn columns(
         let values = rows.iter().enumerate().map(|(i, row)| value(i, row) as i64);
         (name.to_string(), Arc::new(values.collect::<Int64Array>()) as ArrayRef)
     };
-    let tasks: ArrayRef = Arc::new(StringArray::from(vec![task.instruction(); rows.len()]));
+    let tasks: ArrayRef = Arc::new(StringArray::from(vec![task.instruction.as_str(); rows.len()]));
     let mut frame = frames;
     let ends: Vec<usize> = rows
         .iter()

@@ -55,7 +55,7 @@ fn put(dir: &Path, name: &str, bytes: &[u8], files: &mut BTreeMap<String, String
 /// with these hashes.
 pub(super) fn write(
     dir: &Path,
-    (robot, task, layout): (&Robot, Task, &Layout),
+    (robot, task, layout): (&Robot, &Task, &Layout),
     features: &[Feature],
     (episodes, frames): (usize, usize),
     whole: &[Stats],
@@ -136,7 +136,7 @@ fn whole_stats(features: &[Feature], whole: &[Stats]) -> Map<String, Value> {
 }
 
 /// `meta/tasks.parquet`. LeRobot looks tasks up in the pandas index, which pandas finds by this metadata of the Arrow schema.
-fn task_table(task: Task) -> std::result::Result<RecordBatch, arrow_schema::ArrowError> {
+fn task_table(task: &Task) -> std::result::Result<RecordBatch, arrow_schema::ArrowError> {
     let column = |name: &str, pandas: &str, numpy: &str| json!({ "name": name, "field_name": name, "pandas_type": pandas, "numpy_type": numpy, "metadata": null });
     let index = json!({ "name": null, "field_name": null, "pandas_type": "unicode", "numpy_type": "object", "metadata": { "encoding": "UTF-8" } });
     let pandas = json!({
@@ -148,7 +148,7 @@ fn task_table(task: Task) -> std::result::Result<RecordBatch, arrow_schema::Arro
     });
     let columns = vec![
         ("task_index", Arc::new(Int64Array::from(vec![0])) as ArrayRef),
-        ("task", Arc::new(StringArray::from(vec![task.instruction()]))),
+        ("task", Arc::new(StringArray::from(vec![task.instruction.as_str()]))),
     ];
     let fields: Vec<Field> = columns.iter().map(|(name, array)| Field::new(*name, array.data_type().clone(), false)).collect();
     let schema = Schema::new_with_metadata(fields, Metadata::new().with("pandas", pandas.to_string()));

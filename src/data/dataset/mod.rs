@@ -57,7 +57,7 @@ pub fn frames(root: &Path) -> Result<usize> {
 /// # Errors
 /// [`crate::error::Error::Input`] without episodes, for a demo of another task, for rewards that do not fit or are not finite, or when the place
 /// holds something else; [`crate::error::Error::Io`] when the system refuses; what giving an episode returns.
-pub fn write(root: &Path, of: (&Robot, Task), episodes: &Episodes, provenance: &Provenance) -> Result<()> {
+pub fn write(root: &Path, of: (&Robot, &Task), episodes: &Episodes, provenance: &Provenance) -> Result<()> {
     let interrupt = Interrupt::default();
     let content = Content::new(of, provenance, &interrupt);
     atomic::write_dir(root, meta::is_file, |dir| content.fill(dir, episodes))
@@ -70,7 +70,7 @@ pub fn write(root: &Path, of: (&Robot, Task), episodes: &Episodes, provenance: &
 /// As [`write()`]; [`crate::error::Error::Interrupted`].
 pub fn write_split<'a>(
     parent: &Path,
-    of: (&Robot, Task),
+    of: (&Robot, &Task),
     train: &Episodes<'a>,
     validation: &Episodes<'a>,
     provenance: &Provenance,

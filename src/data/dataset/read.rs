@@ -9,7 +9,7 @@ use crate::demo::Demo;
 use crate::error::{Error, Result};
 use crate::layout::Layout;
 use crate::robot::file::built_in::paper_robot;
-use crate::task::Task;
+use crate::task::{Task, built_in};
 use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::Arc;
@@ -17,8 +17,8 @@ use std::sync::Arc;
 /// A dataset in memory.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Dataset {
-    /// The task.
-    pub task: Task,
+    /// The task's name.
+    pub task: String,
     /// What its rows hold.
     pub layout: Arc<Layout>,
     /// Control rate \[Hz\].
@@ -40,8 +40,8 @@ pub struct Dataset {
 /// What a dataset is, its episodes aside.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Description {
-    /// The task.
-    pub task: Task,
+    /// The task's name.
+    pub task: String,
     /// What its rows hold.
     pub layout: Arc<Layout>,
     /// Control rate \[Hz\].
@@ -128,15 +128,15 @@ fn also_rewritten(error: Error, rewritten: Option<&Path>) -> Error {
 ///
 /// # Errors
 /// As [`read`], and [`Error::Input`] for a dataset of another task.
-pub fn read_for(root: &Path, task: Task) -> Result<Dataset> {
+pub fn read_for(root: &Path, task: &str) -> Result<Dataset> {
     let dataset = read(root)?;
     if dataset.task != task {
         // What a task adds that stays as it is does not depend on the robot.
         let fixed = |layout: &Layout| layout.state_dim() - layout.changing();
-        let (found, layout) = (dataset.task, &dataset.layout);
-        let (dim, wanted) = (layout.state_dim(), layout.changing() + fixed(&task.layout(&paper_robot())));
-        let message = format!("is a dataset of {found} (states of {dim} numbers), not of {task} ({wanted})");
-        return Err(Error::input(root, message));
+        let (found, layout) = (&dataset.task, &dataset.layout);
+        let wanted = |task: Arc<Task>| format!(" ({})", layout.changing() + fixed(&task.layout(&paper_robot())));
+        let (dim, wanted) = (layout.state_dim(), built_in::find(task).map(wanted).unwrap_or_default());
+        return Err(Error::input(root, format!("is a dataset of {found} (states of {dim} numbers), not of {task}{wanted}")));
     }
     Ok(dataset)
 }

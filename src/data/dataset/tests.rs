@@ -20,7 +20,7 @@ fn episode(number: usize) -> DatasetEpisode {
 }
 
 fn fill(dir: &Path, episodes: &Episodes, change: impl Fn(&mut Sizes)) -> Result<()> {
-    let (provenance, interrupt) = (Provenance::new("convert", TASK, serde_json::json!({}), 0), Interrupt::default());
+    let (provenance, interrupt) = (Provenance::new("convert", TASK.name(), serde_json::json!({}), 0), Interrupt::default());
     let robot = paper_robot();
     let mut content = Content::new((&robot, TASK), &provenance, &interrupt);
     change(&mut content.sizes);

@@ -24,7 +24,7 @@ use std::sync::Arc;
 /// What the datasets of one call share.
 pub(super) struct Content<'a> {
     pub(super) robot: &'a Robot,
-    pub(super) task: Task,
+    pub(super) task: &'a Task,
     pub(super) layout: Arc<Layout>,
     pub(super) provenance: &'a Provenance,
     pub(super) interrupt: &'a Interrupt,
@@ -40,7 +40,7 @@ struct Encoded {
 
 impl<'a> Content<'a> {
     /// Cut as all datasets are.
-    pub(super) fn new((robot, task): (&'a Robot, Task), provenance: &'a Provenance, interrupt: &'a Interrupt) -> Self {
+    pub(super) fn new((robot, task): (&'a Robot, &'a Task), provenance: &'a Provenance, interrupt: &'a Interrupt) -> Self {
         Content { robot, task, layout: task.layout(robot), provenance, interrupt, sizes: Sizes::USUAL }
     }
 

@@ -4,6 +4,7 @@ use super::answer::answer;
 use super::statistics::{Columns, statistics};
 use crate::data::dataset;
 use crate::error::{Error, Result};
+use crate::task::built_in;
 use serde_json::{Value, json};
 use std::path::Path;
 
@@ -30,7 +31,7 @@ pub(super) fn one(root: &Path) -> Result<Value> {
     }
     let rest = json!({
         "task": found.task,
-        "instruction": found.task.instruction(),
+        "instruction": built_in::find(&found.task).ok().map(|task| task.instruction.clone()),
         "fps": found.fps,
         "episodes": lengths.len(),
         "frames": lengths.iter().sum::<f64>() as u64,

@@ -6,6 +6,7 @@ use crate::data::{ContentHash, Provenance, dataset, recording};
 use crate::demo::{Episode, Phase, Step};
 use crate::error::{Error, Result};
 use crate::interrupt::Interrupt;
+use crate::scene::Scene;
 use crate::state::{Action, CONTROL_DT_S};
 use crate::task::FailureClass;
 use rayon::prelude::*;
@@ -21,9 +22,8 @@ pub(super) fn one(path: &Path) -> Result<Value> {
         |pick: fn(&Step) -> &Action| episode.steps.iter().flat_map(|s| pick(s).iter().map(|v| *v as f32)).collect::<Vec<_>>();
     let layout = episode.scene.task.layout(&episode.scene.robot);
     let [state_names, action_names] = [&layout.state, &layout.action].map(|spans| dataset::names(spans));
-    let task = episode.scene.task;
     let rest = json!({
-        "task": task,
+        "task": episode.scene.task.name,
         "robot": episode.scene.robot.name,
         "episode": episode.index,
         "steps": episode.steps.len(),
@@ -31,7 +31,7 @@ pub(super) fn one(path: &Path) -> Result<Value> {
         "success": episode.success,
         "failure": episode.failure.map(FailureClass::name),
         "reward": reward(&episode),
-        "scene": episode.scene,
+        "scene": scene(&episode.scene),
         "conditions": conditions(&episode),
         "phase_steps": phases(&episode),
         "contact_steps": contacts(&episode),
@@ -207,7 +207,7 @@ fn reward(episode: &Episode) -> f64 {
 
 /// For each condition: at which step it first held, and whether it holds at the end.
 fn conditions(episode: &Episode) -> Vec<Value> {
-    let entry = |(i, name): (usize, &&str)| {
+    let entry = |(i, name): (usize, &String)| {
         let first = moments(episode).position(|s| s.conditions[i]);
         json!({ "name": name, "first_step": first, "at_end": episode.last.conditions[i] })
     };
@@ -219,13 +219,28 @@ fn phases(episode: &Episode) -> Map<String, Value> {
     Phase::ALL.iter().map(|p| (p.name().to_string(), json!(count(*p)))).filter(|(_, n)| *n != json!(0)).collect()
 }
 
+/// What stood where, by name.
+fn scene(scene: &Scene) -> Value {
+    let objects = scene.task.objects.iter().zip(&scene.objects).map(|(object, placed)| (object.name.clone(), json!(placed)));
+    let goals = scene.task.goal_names().into_iter().zip(&scene.goals).map(|(name, goal)| (name, json!(goal)));
+    json!({ "objects": Map::from_iter(objects), "goals": Map::from_iter(goals), "obstacles": scene.obstacles })
+}
+
+/// Steps in which something touched something, by the object's name.
 fn contacts(episode: &Episode) -> Value {
-    let count = |holds: fn(&Step) -> bool| moments(episode).filter(|s| holds(s)).count();
-    json!({
-        "finger_block": count(|s| s.contacts.finger_block_n.iter().any(|f| *f > 0.0)),
-        "block_table": count(|s| s.contacts.block_table),
-        "block_base": count(|s| s.contacts.block_base),
-        "robot_obstacle": count(|s| s.contacts.robot_obstacle),
-        "robot_table": count(|s| s.contacts.robot_table),
-    })
+    let count = |holds: &dyn Fn(&Step) -> bool| moments(episode).filter(|s| holds(s)).count();
+    let task = &episode.scene.task;
+    let mut counts = Map::new();
+    for (i, object) in task.objects.iter().enumerate().take(task.moved()) {
+        let fingers = count(&|s| s.contacts.objects[i].fingers_n.iter().any(|f| *f > 0.0));
+        counts.insert(format!("finger_{}", object.name), json!(fingers));
+        counts.insert(format!("{}_table", object.name), json!(count(&|s| s.contacts.objects[i].table)));
+        for (k, other) in task.objects.iter().enumerate().filter(|(k, _)| *k > i) {
+            let touched = count(&|s| s.contacts.objects[i].objects.contains(&k));
+            counts.insert(format!("{}_{}", object.name, other.name), json!(touched));
+        }
+    }
+    counts.insert("robot_obstacle".into(), json!(count(&|s| s.contacts.robot_obstacle)));
+    counts.insert("robot_table".into(), json!(count(&|s| s.contacts.robot_table)));
+    Value::Object(counts)
 }

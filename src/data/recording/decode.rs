@@ -1,18 +1,20 @@
 //! From the messages of `proto/hilt.proto` back to an episode. Every error says which message and field.
 
-use super::topics::{OUTCOME_TOPIC, ROBOT_NAME, SCENE_TOPIC, STEP_TOPIC};
+use super::older;
+use super::topics::{OUTCOME_TOPIC, ROBOT_NAME, SCENE_TOPIC, STEP_TOPIC, TASK_NAME};
 use super::walk::Outline;
 use crate::config::{self, check_scene};
 use crate::data::proto;
-use crate::demo::{Contacts, Episode, Phase, Step};
+use crate::demo::{Body, Contacts, Episode, Phase, Step, Touch};
 use crate::joints::Joints;
 use crate::robot::Robot;
 use crate::robot::file::built_in::paper_robot;
-use crate::scene::{Obstacle, Scene};
-use crate::state::{Context, Pose, State};
-use crate::task::FailureClass;
+use crate::scene::{Obstacle, Placed, Scene};
+use crate::state::{Pose, State};
+use crate::task::{FailureClass, Task, built_in};
 use prost::Message;
-use std::mem::discriminant;
+use serde::de::DeserializeOwned;
+use std::collections::BTreeSet;
 use std::sync::Arc;
 
 /// Most control steps of a recording: twice the longest demonstration that settings allow, which is the horizon of its policy.
@@ -20,12 +22,15 @@ const MOST_STEPS: usize = 2 * config::MOST_STEPS as usize;
 /// Most bytes of a message that is read; a step has some 700, a scene 60 for every obstacle.
 const MOST_MESSAGE_BYTES: usize = 64 << 10;
 
-/// Most bytes of a robot that is read; that of the paper has 5,000.
-const MOST_ROBOT_BYTES: usize = 1 << 20;
+/// Most bytes of a robot or a task that is read; the robot of the paper has 5,000.
+const MOST_ATTACHED_BYTES: usize = 1 << 20;
 
 /// The messages seen so far.
 struct Seen {
     robot: Arc<Robot>,
+    /// The task that is attached; older files name one of those that there were.
+    task: Option<Arc<Task>>,
+    conditions: Vec<String>,
     scene: Option<Scene>,
     outcome: Option<proto::Outcome>,
     steps: Vec<Step>,
@@ -35,8 +40,9 @@ struct Seen {
 
 /// The episode in a whole file.
 pub(super) fn episode(outline: &Outline) -> Result<Episode, String> {
-    let robot = robot(outline)?;
-    let mut seen = Seen { robot, scene: None, outcome: None, steps: Vec::new(), ended: false };
+    let (robot, task) = (robot(outline)?, task(outline)?);
+    let conditions = Vec::new();
+    let mut seen = Seen { robot, task, conditions, scene: None, outcome: None, steps: Vec::new(), ended: false };
     outline.messages(&mut |topic, data| seen.take(topic, data))?;
     let scene = seen.scene.ok_or_else(|| missing(SCENE_TOPIC))?;
     let outcome = seen.outcome.ok_or_else(|| missing(OUTCOME_TOPIC))?;
@@ -59,7 +65,11 @@ impl Seen {
             return Err(format!("a message on {topic} has {} bytes, at most {MOST_MESSAGE_BYTES} are read", data.len()));
         }
         match topic {
-            SCENE_TOPIC => self.scene = Some(scene(&self.robot, parse(topic, data)?)?),
+            SCENE_TOPIC => {
+                let scene = scene(&self.robot, self.task.as_ref(), parse(topic, data)?)?;
+                self.conditions = scene.task.condition_names();
+                self.scene = Some(scene);
+            }
             OUTCOME_TOPIC => self.outcome = Some(parse(topic, data)?),
             _ => {
                 let scene = self.scene.as_ref().ok_or_else(|| missing(SCENE_TOPIC))?;
@@ -68,11 +78,7 @@ impl Seen {
                     return Err(format!("has more than {MOST_STEPS} steps, the most of an episode"));
                 }
                 self.ended = message.final_state;
-                let step = step(message, t, scene)?;
-                if discriminant(&step.state.context) != discriminant(&scene.context) {
-                    return Err(format!("step {t} has the goal or base block of another task than {}", scene.task));
-                }
-                self.steps.push(step);
+                self.steps.push(step(message, t, scene, &self.conditions)?);
             }
         }
         Ok(())
@@ -89,60 +95,115 @@ fn parse<M: Message + Default>(topic: &str, data: &[u8]) -> Result<M, String> {
 
 /// Who acted; a recording that does not say is of the paper's robot, when there was no other.
 fn robot(outline: &Outline) -> Result<Arc<Robot>, String> {
-    let Some(bytes) = outline.attachments.get(ROBOT_NAME) else { return Ok(paper_robot()) };
-    if bytes.len() > MOST_ROBOT_BYTES {
-        return Err(format!("{ROBOT_NAME} has {} bytes, at most {MOST_ROBOT_BYTES} are read", bytes.len()));
-    }
-    let robot: Robot = serde_json::from_slice(bytes).map_err(|e| format!("{ROBOT_NAME} cannot be read: {e}"))?;
+    let Some(robot) = attached::<Robot>(outline, ROBOT_NAME)? else { return Ok(paper_robot()) };
     robot.check().map_err(|why| format!("{ROBOT_NAME} cannot be: {why}"))?;
     Ok(Arc::new(robot))
 }
 
-fn scene(robot: &Arc<Robot>, message: proto::Scene) -> Result<Scene, String> {
+/// What was to be done, where that is attached.
+fn task(outline: &Outline) -> Result<Option<Arc<Task>>, String> {
+    attached(outline, TASK_NAME).map(|task| task.map(Arc::new))
+}
+
+fn attached<T: DeserializeOwned>(outline: &Outline, name: &str) -> Result<Option<T>, String> {
+    let Some(bytes) = outline.attachments.get(name) else { return Ok(None) };
+    if bytes.len() > MOST_ATTACHED_BYTES {
+        return Err(format!("{name} has {} bytes, at most {MOST_ATTACHED_BYTES} are read", bytes.len()));
+    }
+    serde_json::from_slice(bytes).map(Some).map_err(|e| format!("{name} cannot be read: {e}"))
+}
+
+fn scene(robot: &Arc<Robot>, task: Option<&Arc<Task>>, message: proto::Scene) -> Result<Scene, String> {
     let obstacle = |o: &proto::Obstacle| {
         Ok(Obstacle { center_m: fixed("obstacle.center_m", &o.center_m)?, size_m: fixed("obstacle.size_m", &o.size_m)? })
     };
-    let scene = Scene {
-        robot: Arc::clone(robot),
-        task: message.task.parse()?,
-        block: pose("scene.block", message.block.as_ref())?,
-        context: context(message.context.as_ref())?,
-        obstacles: message.obstacles.iter().map(obstacle).collect::<Result<_, String>>()?,
-        friction: message.friction,
-        block_mass_kg: message.block_mass_kg,
+    let obstacles = message.obstacles.iter().map(obstacle).collect::<Result<_, String>>()?;
+    let scene = match task {
+        Some(task) if task.name != message.task => {
+            return Err(format!("its scene is of {}, {TASK_NAME} of {task}", message.task));
+        }
+        Some(task) => {
+            let (robot, task) = (Arc::clone(robot), Arc::clone(task));
+            let placed = |placed: &proto::Placed| {
+                let (friction, mass_kg) = (placed.friction, placed.mass_kg);
+                Ok(Placed { pose: pose(&placed.name, placed.pose.as_ref())?, friction, mass_kg })
+            };
+            let objects = message.objects.iter().map(placed).collect::<Result<_, String>>()?;
+            Scene { robot, task, objects, goals: points(&message.goals)?, obstacles }
+        }
+        None => older::scene(robot, &built_in::find(&message.task)?, &message, obstacles)?,
     };
     check_scene(&scene).map_err(|why| format!("its scene cannot be: {why}"))?;
     Ok(scene)
 }
 
-fn step(message: proto::Step, t: usize, scene: &Scene) -> Result<Step, String> {
+fn step(message: proto::Step, t: usize, scene: &Scene, conditions: &[String]) -> Result<Step, String> {
     if message.step != t as u64 {
         return Err(format!("step {} stands where step {t} belongs", message.step));
     }
-    let (task, robot) = (scene.task, &*scene.robot);
+    let (task, robot) = (&scene.task, &*scene.robot);
     let joints = |name: &str, values: &[f64]| exactly(name, values, robot.joints.len());
     let names: Vec<&str> = message.conditions.iter().map(|c| c.name.as_str()).collect();
-    if names != task.condition_names() {
-        return Err(format!("step {t} has the conditions {names:?}, {task} has {:?}", task.condition_names()));
+    if names != conditions {
+        return Err(format!("step {t} has the conditions {names:?}, {task} has {conditions:?}"));
+    }
+    let found = if message.block.is_some() { older::moment(&message, scene)? } else { moment(&message)? };
+    let counts = [found.seen.len(), found.objects.len(), found.touches.len()];
+    if counts != [task.objects.len(); 3] || found.goals.len() != scene.goals.len() {
+        return Err(format!("step {t} has the goal, base block or objects of another task than {task}"));
     }
     let state = State {
         q: joints("q_rad", &message.q_rad)?,
         dq: joints("dq_rad_s", &message.dq_rad_s)?,
-        block: pose("block", message.block.as_ref())?,
-        context: context(message.context.as_ref())?,
+        objects: found.seen,
+        goals: found.goals,
     };
-    let base_now = message.base_now.as_ref().map(|base| pose("base_now", Some(base))).transpose()?;
+    let contacts = message.contacts.as_ref().ok_or("contacts are missing")?;
+    let touches = found.touches.into_iter().map(|found| touch(&found, robot.fingers().len(), task.objects.len()));
     Ok(Step {
         state,
-        base_now,
+        objects: found.objects,
         commanded: joints("commanded_rad_s", &message.commanded_rad_s)?,
         executed: joints("executed_rad_s", &message.executed_rad_s)?,
-        contacts: contacts(message.contacts.as_ref(), robot.fingers().len())?,
-        block_speed_m_s: message.block_speed_m_s,
+        contacts: Contacts {
+            objects: touches.collect::<Result<_, _>>()?,
+            robot_obstacle: contacts.robot_obstacle,
+            robot_table: contacts.robot_table,
+        },
         reward: message.reward,
         conditions: message.conditions.iter().map(|c| c.holds).collect(),
         phase: phase(message.phase)?,
     })
+}
+
+/// What a step says of the task's objects.
+pub(super) struct Moment {
+    pub(super) seen: Vec<Pose>,
+    pub(super) goals: Vec<[f64; 3]>,
+    pub(super) objects: Vec<Body>,
+    pub(super) touches: Vec<proto::Touch>,
+}
+
+fn moment(message: &proto::Step) -> Result<Moment, String> {
+    let body = |body: &proto::Body| Ok(Body { pose: pose("an object", body.pose.as_ref())?, speed_m_s: body.speed_m_s });
+    Ok(Moment {
+        seen: message.seen.iter().map(|at| pose("an object that is seen", Some(at))).collect::<Result<_, _>>()?,
+        goals: points(&message.goals)?,
+        objects: message.objects.iter().map(body).collect::<Result<_, String>>()?,
+        touches: message.contacts.as_ref().map_or_else(Vec::new, |contacts| contacts.objects.clone()),
+    })
+}
+
+fn touch(message: &proto::Touch, fingers: usize, objects: usize) -> Result<Touch, String> {
+    let touched = message.objects.iter().map(|object| *object as usize).collect::<BTreeSet<usize>>();
+    if let Some(unknown) = touched.iter().find(|object| **object >= objects) {
+        return Err(format!("an object touches object {unknown}, of {objects}"));
+    }
+    Ok(Touch { fingers_n: exactly("fingers_n", &message.fingers_n, fingers)?, table: message.table, objects: touched })
+}
+
+fn points(messages: &[proto::Point]) -> Result<Vec<[f64; 3]>, String> {
+    messages.iter().map(|point| fixed("goal", &point.position_m)).collect()
 }
 
 /// A number for each of so many joints.
@@ -151,32 +212,13 @@ fn exactly(name: &str, values: &[f64], expected: usize) -> Result<Joints, String
     fits.ok_or_else(|| format!("{name} has {} numbers, expected {expected}", values.len()))
 }
 
-fn fixed<const N: usize>(name: &str, values: &[f64]) -> Result<[f64; N], String> {
+pub(super) fn fixed<const N: usize>(name: &str, values: &[f64]) -> Result<[f64; N], String> {
     values.try_into().map_err(|_| format!("{name} has {} numbers, expected {N}", values.len()))
 }
 
-fn pose(name: &str, message: Option<&proto::Pose>) -> Result<Pose, String> {
+pub(super) fn pose(name: &str, message: Option<&proto::Pose>) -> Result<Pose, String> {
     let message = message.ok_or_else(|| format!("{name} is missing"))?;
     Ok(Pose { position_m: fixed(name, &message.position_m)?, quaternion_xyzw: fixed(name, &message.quaternion_xyzw)? })
-}
-
-fn context(message: Option<&proto::Context>) -> Result<Context, String> {
-    Ok(match message.and_then(|c| c.kind.as_ref()) {
-        None => Context::None,
-        Some(proto::context::Kind::Goal(goal)) => Context::Goal(fixed("goal", &goal.position_m)?),
-        Some(proto::context::Kind::Base(base)) => Context::Base(pose("base", Some(base))?),
-    })
-}
-
-fn contacts(message: Option<&proto::Contacts>, fingers: usize) -> Result<Contacts, String> {
-    let message = message.ok_or("contacts are missing")?;
-    Ok(Contacts {
-        finger_block_n: exactly("finger_block_n", &message.finger_block_n, fingers)?,
-        block_table: message.block_table,
-        block_base: message.block_base,
-        robot_obstacle: message.robot_obstacle,
-        robot_table: message.robot_table,
-    })
 }
 
 fn phase(code: i32) -> Result<Option<Phase>, String> {

@@ -1,40 +1,45 @@
 //! From an episode's own types to the messages of `proto/hilt.proto`.
 
 use crate::data::proto;
-use crate::demo::{Contacts, Episode, Phase, Step};
-use crate::scene::{Obstacle, Scene};
-use crate::state::{Context, Pose};
-use crate::task::{FailureClass, Task};
+use crate::demo::{Body, Contacts, Episode, Phase, Step, Touch};
+use crate::scene::{Obstacle, Placed, Scene};
+use crate::state::Pose;
+use crate::task::{FailureClass, Object};
 
-pub(super) fn step(step: &Step, task: Task, number: usize, final_state: bool) -> proto::Step {
-    let conditions = task.condition_names().iter().zip(&step.conditions);
+pub(super) fn step(step: &Step, conditions: &[String], number: usize, final_state: bool) -> proto::Step {
+    let conditions = conditions.iter().zip(&step.conditions);
     proto::Step {
         step: number as u64,
         q_rad: step.state.q.to_vec(),
         dq_rad_s: step.state.dq.to_vec(),
-        block: Some(pose(&step.state.block)),
-        context: Some(context(&step.state.context)),
-        base_now: step.base_now.as_ref().map(pose),
         commanded_rad_s: step.commanded.to_vec(),
         executed_rad_s: step.executed.to_vec(),
         contacts: Some(contacts(&step.contacts)),
-        block_speed_m_s: step.block_speed_m_s,
         reward: step.reward,
-        conditions: conditions.map(|(name, holds)| proto::Condition { name: (*name).into(), holds: *holds }).collect(),
+        conditions: conditions.map(|(name, holds)| proto::Condition { name: name.clone(), holds: *holds }).collect(),
         phase: phase(step.phase).into(),
         final_state,
+        seen: step.state.objects.iter().map(pose).collect(),
+        goals: step.state.goals.iter().map(point).collect(),
+        objects: step.objects.iter().map(body).collect(),
+        ..proto::Step::default()
     }
 }
 
 pub(super) fn scene(scene: &Scene) -> proto::Scene {
+    let placed = |(object, at): (&Object, &Placed)| proto::Placed {
+        name: object.name.clone(),
+        pose: Some(pose(&at.pose)),
+        friction: at.friction,
+        mass_kg: at.mass_kg,
+    };
     let obstacle = |o: &Obstacle| proto::Obstacle { center_m: o.center_m.to_vec(), size_m: o.size_m.to_vec() };
     proto::Scene {
-        task: scene.task.name().into(),
-        block: Some(pose(&scene.block)),
-        context: Some(context(&scene.context)),
+        task: scene.task.name.clone(),
         obstacles: scene.obstacles.iter().map(obstacle).collect(),
-        friction: scene.friction,
-        block_mass_kg: scene.block_mass_kg,
+        objects: scene.task.objects.iter().zip(&scene.objects).map(placed).collect(),
+        goals: scene.goals.iter().map(point).collect(),
+        ..proto::Scene::default()
     }
 }
 
@@ -51,22 +56,25 @@ fn pose(pose: &Pose) -> proto::Pose {
     proto::Pose { position_m: pose.position_m.to_vec(), quaternion_xyzw: pose.quaternion_xyzw.to_vec() }
 }
 
-fn context(context: &Context) -> proto::Context {
-    let kind = match context {
-        Context::None => None,
-        Context::Goal(goal) => Some(proto::context::Kind::Goal(proto::Point { position_m: goal.to_vec() })),
-        Context::Base(base) => Some(proto::context::Kind::Base(pose(base))),
-    };
-    proto::Context { kind }
+fn point(point: &[f64; 3]) -> proto::Point {
+    proto::Point { position_m: point.to_vec() }
+}
+
+fn body(body: &Body) -> proto::Body {
+    proto::Body { pose: Some(pose(&body.pose)), speed_m_s: body.speed_m_s }
 }
 
 fn contacts(contacts: &Contacts) -> proto::Contacts {
+    let touch = |touch: &Touch| proto::Touch {
+        fingers_n: touch.fingers_n.to_vec(),
+        table: touch.table,
+        objects: touch.objects.iter().map(|object| *object as u32).collect(),
+    };
     proto::Contacts {
-        finger_block_n: contacts.finger_block_n.to_vec(),
-        block_table: contacts.block_table,
-        block_base: contacts.block_base,
         robot_obstacle: contacts.robot_obstacle,
         robot_table: contacts.robot_table,
+        objects: contacts.objects.iter().map(touch).collect(),
+        ..proto::Contacts::default()
     }
 }
 

@@ -2,34 +2,37 @@
 
 use crate::demo::Step;
 use crate::robot::Robot;
-use crate::scene::{BLOCK_EDGE_M, Scene};
-use crate::state::{Context, Pose, State};
+use crate::scene::Scene;
+use crate::state::{Pose, State};
+use crate::task::Shape;
 use foxglove::messages::{
-    self as msg, Color, CubePrimitive, FrameTransform, FrameTransforms, JointState, JointStates, Quaternion, SceneEntity,
-    SceneUpdate, SpherePrimitive, Timestamp, Vector3,
+    self as msg, Color, CubePrimitive, CylinderPrimitive, FrameTransform, FrameTransforms, JointState, JointStates, Quaternion,
+    SceneEntity, SceneUpdate, SpherePrimitive, Timestamp, Vector3,
 };
 use nalgebra::Isometry3;
 
 /// The fixed frame: the robot's foot, z up.
 pub const WORLD_FRAME: &str = "world";
-/// The block to move.
-pub const BLOCK_FRAME: &str = "block";
-/// The base block of the stack task.
-pub const BASE_FRAME: &str = "base_block";
+/// The frame of an object of the task: no link of a robot is called so.
+pub fn frame_of(object: &str) -> String {
+    format!("object/{object}")
+}
 
 /// Drawn table: edge lengths \[m\]; it reaches past everything the arm can touch.
 const TABLE_SIZE_M: [f64; 3] = [2.0, 2.0, 0.04];
 /// Drawn goal: diameter of the ball \[m\].
 const GOAL_DIAMETER_M: f64 = 0.02;
 const GREY: [f64; 4] = [0.75, 0.75, 0.72, 1.0];
-const RED: [f64; 4] = [0.80, 0.22, 0.18, 1.0];
+/// Objects that goals move: red, yellow, violet.
+const MOVED: [[f64; 4]; 3] = [[0.80, 0.22, 0.18, 1.0], [0.88, 0.66, 0.16, 1.0], [0.55, 0.33, 0.68, 1.0]];
 const BLUE: [f64; 4] = [0.20, 0.40, 0.75, 1.0];
 const GREEN: [f64; 4] = [0.20, 0.65, 0.30, 0.8];
 const DARK: [f64; 4] = [0.30, 0.30, 0.34, 1.0];
 const NANOSECONDS_PER_SECOND: u64 = 1_000_000_000;
 
-/// `/tf`: every link below its URDF parent (the base link below the world), the block, the base block.
-pub(super) fn frames(robot: &Robot, step: &Step, time_ns: u64) -> FrameTransforms {
+/// `/tf`: every link below its URDF parent (the base link below the world), and the objects.
+pub(super) fn frames(scene: &Scene, step: &Step, time_ns: u64) -> FrameTransforms {
+    let robot = &*scene.robot;
     let links = robot.link_poses(&step.state.q);
     let name = |link: usize| robot.links[link].name.as_str();
     let mut transforms = vec![transform(WORLD_FRAME, name(0), &links[0], time_ns)];
@@ -37,9 +40,8 @@ pub(super) fn frames(robot: &Robot, step: &Step, time_ns: u64) -> FrameTransform
         let parent_from_child = links[joint.parent].inverse() * links[i + 1];
         transforms.push(transform(name(joint.parent), name(i + 1), &parent_from_child, time_ns));
     }
-    transforms.push(transform(WORLD_FRAME, BLOCK_FRAME, &step.state.block.isometry(), time_ns));
-    if let Some(base) = step.base_now {
-        transforms.push(transform(WORLD_FRAME, BASE_FRAME, &base.isometry(), time_ns));
+    for (object, now) in scene.task.objects.iter().zip(&step.objects) {
+        transforms.push(transform(WORLD_FRAME, &frame_of(&object.name), &now.pose.isometry(), time_ns));
     }
     FrameTransforms { transforms }
 }
@@ -58,25 +60,29 @@ pub(super) fn joints(robot: &Robot, state: &State, time_ns: u64) -> JointStates 
 
 /// `/scene`: things that keep their shape; those that move are locked to their frame.
 pub(super) fn drawing(scene: &Scene) -> SceneUpdate {
-    let block = [BLOCK_EDGE_M; 3];
     let table = cube([0.0, 0.0, -TABLE_SIZE_M[2] / 2.0], TABLE_SIZE_M, GREY);
-    let mut entities = vec![
-        SceneEntity { cubes: vec![table], ..entity("table", WORLD_FRAME) },
-        SceneEntity { cubes: vec![cube([0.0; 3], block, RED)], ..entity("block", BLOCK_FRAME) },
-    ];
-    match scene.context {
-        Context::None => {}
-        Context::Goal(goal) => {
-            let ball = SpherePrimitive {
-                pose: Some(pose(&at(goal))),
-                size: Some(vector([GOAL_DIAMETER_M; 3])),
-                color: Some(color(GREEN)),
-            };
-            entities.push(SceneEntity { spheres: vec![ball], ..entity("goal", WORLD_FRAME) });
+    let mut entities = vec![SceneEntity { cubes: vec![table], ..entity("table", WORLD_FRAME) }];
+    for (i, object) in scene.task.objects.iter().enumerate() {
+        let rgba = if i < scene.task.moved() { MOVED[i % MOVED.len()] } else { BLUE };
+        let mut drawn = entity(&object.name, &frame_of(&object.name));
+        if let Shape::Cylinder { radius_m, height_m } = object.shape {
+            drawn.cylinders.push(CylinderPrimitive {
+                pose: Some(pose(&at([0.0; 3]))),
+                size: Some(vector([2.0 * radius_m, 2.0 * radius_m, height_m])),
+                bottom_scale: 1.0,
+                top_scale: 1.0,
+                color: Some(color(rgba)),
+            });
+        } else {
+            let boxes = object.shape.boxes_m().into_iter();
+            drawn.cubes = boxes.map(|(center, half)| cube(center, half.map(|h| 2.0 * h), rgba)).collect();
         }
-        Context::Base(_) => {
-            entities.push(SceneEntity { cubes: vec![cube([0.0; 3], block, BLUE)], ..entity("base_block", BASE_FRAME) });
-        }
+        entities.push(drawn);
+    }
+    for (name, goal) in scene.task.goal_names().iter().zip(&scene.goals) {
+        let ball =
+            SpherePrimitive { pose: Some(pose(&at(*goal))), size: Some(vector([GOAL_DIAMETER_M; 3])), color: Some(color(GREEN)) };
+        entities.push(SceneEntity { spheres: vec![ball], ..entity(name, WORLD_FRAME) });
     }
     if !scene.obstacles.is_empty() {
         let cubes = scene.obstacles.iter().map(|o| cube(o.center_m, o.size_m, DARK)).collect();

@@ -2,25 +2,26 @@
 //!
 //! | topic | schema | what |
 //! |---|---|---|
-//! | `/tf` | foxglove.FrameTransforms | robot links by forward kinematics, block, base block |
+//! | `/tf` | foxglove.FrameTransforms | robot links by forward kinematics, objects |
 //! | `/joint_states` | foxglove.JointStates | angle \[rad\] and velocity \[rad/s\] by URDF joint name |
-//! | `/scene` | foxglove.SceneUpdate | table, blocks, goal, obstacles: once, attached to their frames |
+//! | `/scene` | foxglove.SceneUpdate | table, objects, goals, obstacles: once, attached to their frames |
 //! | `/hilt/scene` | hilt.Scene | what stood where at the start: once |
 //! | `/hilt/step` | hilt.Step | every control step, then the final state |
 //! | `/hilt/outcome` | hilt.Outcome | success or failure class: once, at the end |
 //!
-//! The robot is attached twice: as `robot.urdf` for viewers, as `robot.json` with all that hilt knows of it; the metadata record `hilt` holds provenance and seal. Times are simulated, from 0. MCAP's own
+//! The robot is attached twice: as `robot.urdf` for viewers, as `robot.json` with all that hilt knows of it; the task as `task.json`; the metadata record `hilt` holds provenance and seal. Times are simulated, from 0. MCAP's own
 //! checksums hold as well: the one of the data section is computed last and covers the seal, which takes its place for zeros.
 
 mod decode;
 mod encode;
 mod fields;
 mod foxglove;
+mod older;
 mod records;
 mod topics;
 mod walk;
 
-pub use foxglove::{BASE_FRAME, BLOCK_FRAME, WORLD_FRAME};
+pub use foxglove::{WORLD_FRAME, frame_of};
 
 use super::bytes::{Ends, Format};
 use super::{ContentHash, Provenance, atomic, proto, provenance, seal};
@@ -42,7 +43,7 @@ use std::collections::BTreeMap;
 use std::io::Cursor;
 use std::path::{Path, PathBuf};
 use topics::{OUTCOME_TOPIC, SCENE_TOPIC, STEP_TOPIC};
-pub use topics::{ROBOT_NAME, URDF_NAME};
+pub use topics::{ROBOT_NAME, TASK_NAME, URDF_NAME};
 use walk::Outline;
 
 /// Duration of a control step on the clock of the file \[ns\].
@@ -97,7 +98,7 @@ pub fn write(path: &Path, episode: &Episode, provenance: &Provenance) -> Result<
 pub fn encode(path: &Path, episode: &Episode, provenance: &Provenance) -> Result<Vec<u8>> {
     let expected = episode.scene.task.condition_names().len();
     if let Some(step) = episode.steps.iter().chain([&episode.last]).find(|s| s.conditions.len() != expected) {
-        let message = format!("a step has {} conditions, {} has {expected}", step.conditions.len(), episode.scene.task);
+        let message = format!("a step has {} conditions, {} has {expected}", step.conditions.len(), episode.scene.task.name);
         return Err(Error::input(path, message));
     }
     let bytes = to_mcap(episode, provenance).map_err(|e| Error::input(path, format!("cannot be encoded as MCAP: {e}")))?;
@@ -212,7 +213,12 @@ fn to_mcap(episode: &Episode, provenance: &Provenance) -> McapResult<Vec<u8>> {
     write_messages(&mut writer, episode)?;
     let robot = &*episode.scene.robot;
     let json = serde_json::to_vec(robot).expect("a robot is plain data with text keys");
-    let attachments = [(URDF_NAME, "application/xml", urdf(robot).into_bytes()), (ROBOT_NAME, "application/json", json)];
+    let task = serde_json::to_vec(&*episode.scene.task).expect("a task is plain data with text keys");
+    let attachments = [
+        (URDF_NAME, "application/xml", urdf(robot).into_bytes()),
+        (ROBOT_NAME, "application/json", json),
+        (TASK_NAME, "application/json", task),
+    ];
     for (name, media_type, data) in attachments {
         let data = Cow::Owned(data);
         writer.attach(&Attachment { log_time: 0, create_time: 0, name: name.into(), media_type: media_type.into(), data })?;
@@ -233,12 +239,12 @@ fn write_messages(writer: &mut Writer<Cursor<Vec<u8>>>, episode: &Episode) -> Mc
     let robot = &*episode.scene.robot;
     scene.write(writer, 0, &encode::scene(&episode.scene))?;
     drawing.write(writer, 0, &foxglove::drawing(&episode.scene))?;
-    let end = episode.steps.len();
+    let (end, conditions) = (episode.steps.len(), episode.scene.task.condition_names());
     for (t, step) in episode.steps.iter().chain([&episode.last]).enumerate() {
         let time = t as u64 * STEP_NS;
-        frames.write(writer, time, &foxglove::frames(robot, step, time))?;
+        frames.write(writer, time, &foxglove::frames(&episode.scene, step, time))?;
         joints.write(writer, time, &foxglove::joints(robot, &step.state, time))?;
-        steps.write(writer, time, &encode::step(step, episode.scene.task, t, t == end))?;
+        steps.write(writer, time, &encode::step(step, &conditions, t, t == end))?;
     }
     outcome.write(writer, end as u64 * STEP_NS, &encode::outcome(episode))
 }

@@ -10,3 +10,5 @@ pub const OUTCOME_TOPIC: &str = "/hilt/outcome";
 pub const URDF_NAME: &str = "robot.urdf";
 /// Name of the attached robot, all that hilt knows of it.
 pub const ROBOT_NAME: &str = "robot.json";
+/// Name of the attached task.
+pub const TASK_NAME: &str = "task.json";

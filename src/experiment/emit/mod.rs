@@ -37,7 +37,7 @@ pub fn list(grid: &Grid, states: &[State], threads: usize) -> Value {
         json!({
             "id": step.id,
             "stage": step.stage.name(),
-            "task": step.task.name(),
+            "task": step.task,
             "seed": step.seed,
             "command": argv,
             "inputs": step.inputs.iter().map(|input| &input.path).collect::<Vec<_>>(),

@@ -7,7 +7,6 @@ use crate::experiment::estimate::{in_words, wall_s_of};
 use crate::report::chart::{Datum, Picture, Row, Rows};
 use crate::report::page::{Block, Cell, Column, Table};
 use crate::report::statistics::{Strata, interquartile_mean, mean};
-use crate::task::Task;
 use crate::tasks::FailureClass;
 use std::path::Path;
 
@@ -26,9 +25,9 @@ pub fn head(finished: &Finished) -> Vec<Block> {
 
 /// Seeds of unfinished runs, an item an arm and task.
 fn missing(finished: &Finished) -> Vec<String> {
-    let mut items: Vec<((Arm, Task), Vec<u64>)> = Vec::new();
+    let mut items: Vec<((Arm, &str), Vec<u64>)> = Vec::new();
     for run in finished.grid.runs.iter().filter(|run| finished.contents[run.evaluate].is_none()) {
-        let key = (Arm::of(run), run.task);
+        let key = (Arm::of(run), run.task.as_str());
         match items.iter_mut().find(|(known, _)| *known == key) {
             Some((_, list)) => list.push(run.seed),
             None => items.push((key, vec![run.seed])),
@@ -39,7 +38,7 @@ fn missing(finished: &Finished) -> Vec<String> {
 
 /// A caption's last sentence: what the intervals are.
 pub fn intervals(finished: &Finished) -> &'static str {
-    let several = finished.arms().iter().any(|arm| finished.tasks().iter().any(|task| finished.of(*arm, *task).count() > 1));
+    let several = finished.arms().iter().any(|arm| finished.tasks().iter().any(|task| finished.of(*arm, task).count() > 1));
     if several {
         "Intervals: 95 %, over seeds by the bootstrap; of one seed Wilson's over its episodes."
     } else {
@@ -56,8 +55,8 @@ pub fn success_figure(finished: &Finished) -> Picture {
         let many = experiment.presets.len() > 1 && !arm.variation.is_empty();
         let name = if many { format!("{words} ({})", arm.preset) } else { words };
         let data = tasks.iter().enumerate().filter_map(|(panel, task)| {
-            let estimate = finished.success(arm, *task)?;
-            let singles = finished.singles(arm, *task);
+            let estimate = finished.success(arm, task)?;
+            let singles = finished.singles(arm, task);
             let series = arm.method.name().to_string();
             Some(Datum { panel, look: look(arm.method), series, value: estimate.value, interval: estimate.interval, singles })
         });
@@ -74,7 +73,7 @@ pub fn success_figure(finished: &Finished) -> Picture {
                 .into(),
         x_label: "success".into(),
         note: "markers: mean over seeds, with 95 % intervals; dots: single seeds".into(),
-        panels: tasks.iter().map(|task| task.name().into()).collect(),
+        panels: tasks.iter().map(|task| task.to_string()).collect(),
         rows,
     };
     rows.draw()
@@ -85,13 +84,13 @@ pub fn success_table(finished: &Finished) -> Table {
     let tasks = finished.tasks();
     let mut columns = vec![Column::words("")];
     for task in &tasks {
-        columns.extend([Column::of(task.name(), "success, %"), Column::of(task.name(), "seeds")]);
+        columns.extend([Column::of(task, "success, %"), Column::of(task, "seeds")]);
     }
     let row = |arm: &Arm| {
         let mut cells = vec![Cell::from(finished.label(*arm))];
         for task in &tasks {
-            let count = finished.of(*arm, *task).count();
-            let success = finished.success(*arm, *task).map_or("–".into(), percent_within);
+            let count = finished.of(*arm, task).count();
+            let success = finished.success(*arm, task).map_or("–".into(), percent_within);
             cells.extend([success.into(), if count == 0 { "–".into() } else { count.to_string().into() }]);
         }
         cells
@@ -107,15 +106,11 @@ pub fn aggregates(finished: &Finished, arms: &[Arm]) -> Option<Block> {
         return None;
     }
     let row = |arm: &Arm| {
-        let has_runs = |task: &&Task| finished.of(*arm, **task).next().is_some();
-        let tasks: Vec<Task> = tasks.iter().filter(has_runs).copied().collect();
+        let has_runs = |task: &&&str| finished.of(*arm, task).next().is_some();
+        let tasks: Vec<&str> = tasks.iter().filter(has_runs).copied().collect();
         let strata = balanced(finished.strata(*arm, &tasks));
         let count = strata[0].len();
-        let names = if tasks.len() == finished.tasks().len() {
-            "all".into()
-        } else {
-            tasks.iter().map(|t| t.name()).collect::<Vec<_>>().join(", ")
-        };
+        let names = if tasks.len() == finished.tasks().len() { "all".into() } else { tasks.join(", ") };
         let values = [interquartile_mean, mean].map(|statistic| match count {
             0 => "–".into(),
             1 => percent(statistic(&strata).value),

@@ -5,7 +5,6 @@ use super::words::{listed, points_within, probability_within};
 use crate::experiment::ReportKind;
 use crate::report::page::{Block, Cell, Column, Table};
 use crate::report::statistics::{Comparison, Verdict};
-use crate::task::Task;
 
 /// Two arms.
 type Pair<'a> = (Arm<'a>, Arm<'a>);
@@ -37,16 +36,16 @@ struct Compared {
 }
 
 impl Compared {
-    fn of(finished: &Finished, (x, y): Pair, tasks: &[Task]) -> Option<Self> {
+    fn of(finished: &Finished, (x, y): Pair, tasks: &[&str]) -> Option<Self> {
         let found = compare(finished, x, y, tasks)?;
-        let shared = tasks.iter().filter(|task| !finished.scores(x, **task).is_empty() && !finished.scores(y, **task).is_empty());
-        let tasks: Vec<String> = shared.map(|task| task.name().into()).collect();
+        let shared = tasks.iter().filter(|task| !finished.scores(x, task).is_empty() && !finished.scores(y, task).is_empty());
+        let tasks: Vec<String> = shared.map(|task| task.to_string()).collect();
         Some(Compared { names: [finished.label(x), finished.label(y)], tasks: tasks.join(", "), found })
     }
 }
 
 /// Two arms on these tasks; `None` when they share no seed.
-pub fn compare(finished: &Finished, x: Arm, y: Arm, tasks: &[Task]) -> Option<Comparison> {
+pub fn compare(finished: &Finished, x: Arm, y: Arm, tasks: &[&str]) -> Option<Comparison> {
     Comparison::of(&finished.strata(x, tasks), &finished.strata(y, tasks))
 }
 

@@ -4,7 +4,6 @@ use super::curves::over_epochs;
 use super::finished::{Arm, Finished, Measured};
 use crate::report::chart::{Axis, Chart, LOOKS, Panel, Point, Series};
 use crate::report::page::{Block, Cell, Column, Table};
-use crate::task::Task;
 
 /// The column of the metrics.
 const D_CONV: &str = "d_conv";
@@ -12,15 +11,15 @@ const D_CONV: &str = "d_conv";
 /// Curves, and their beginnings and ends.
 pub fn blocks(finished: &Finished) -> Vec<Block> {
     let arms = finished.arms();
-    let curve = |arm: &Arm, task: Task| over_epochs(&finished.of(*arm, task).collect::<Vec<&Measured>>(), D_CONV);
-    let panel = |task: &Task| {
+    let curve = |arm: &Arm, task: &str| over_epochs(&finished.of(*arm, task).collect::<Vec<&Measured>>(), D_CONV);
+    let panel = |task: &&str| {
         let series = arms.iter().enumerate().map(|(i, arm)| Series {
             name: finished.label(*arm),
             look: i % LOOKS,
-            points: curve(arm, *task),
+            points: curve(arm, task),
             dense: true,
         });
-        Panel { title: task.name().into(), series: series.filter(|series| !series.points.is_empty()).collect() }
+        Panel { title: task.to_string(), series: series.filter(|series| !series.points.is_empty()).collect() }
     };
     let panels: Vec<Panel> = finished.tasks().iter().map(panel).filter(|panel| !panel.series.is_empty()).collect();
     if panels.is_empty() {
@@ -42,7 +41,7 @@ pub fn blocks(finished: &Finished) -> Vec<Block> {
     vec![Block::Figure(chart.draw(), caption.into()), Block::Table(table(finished, &arms, curve))]
 }
 
-fn table(finished: &Finished, arms: &[Arm], curve: impl Fn(&Arm, Task) -> Vec<Point>) -> Table {
+fn table(finished: &Finished, arms: &[Arm], curve: impl Fn(&Arm, &str) -> Vec<Point>) -> Table {
     let mut rows = Vec::new();
     for arm in arms {
         for task in finished.tasks() {

@@ -4,7 +4,6 @@ use super::finished::{Arm, Finished, look};
 use crate::config::Stage;
 use crate::report::chart::{Axis, Chart, Panel, Point, Series};
 use crate::report::page::Block;
-use crate::task::Task;
 
 /// A figure with a panel for each task and each rest of the variations' names.
 pub fn blocks(finished: &Finished) -> Vec<Block> {
@@ -45,7 +44,7 @@ pub fn blocks(finished: &Finished) -> Vec<Block> {
     vec![Block::Figure(chart.draw(), caption)]
 }
 
-fn panel(finished: &Finished, arms: &[Arm], (preset, task, of): (&str, Task, &str)) -> Option<Panel> {
+fn panel(finished: &Finished, arms: &[Arm], (preset, task, of): (&str, &str, &str)) -> Option<Panel> {
     let series = finished.experiment.methods.iter().filter_map(|method| {
         let mut points: Vec<Point> = Vec::new();
         let arms = arms.iter().filter(|arm| (arm.preset, arm.method) == (preset, *method));
@@ -60,13 +59,13 @@ fn panel(finished: &Finished, arms: &[Arm], (preset, task, of): (&str, Task, &st
         (!points.is_empty()).then(|| Series { name: method.name().into(), look: look(*method), points, dense: false })
     });
     let series: Vec<Series> = series.collect();
-    let words = [task.name(), of, if finished.experiment.presets.len() > 1 { preset } else { "" }];
+    let words = [task, of, if finished.experiment.presets.len() > 1 { preset } else { "" }];
     let title = words.into_iter().filter(|word| !word.is_empty()).collect::<Vec<_>>().join(", ");
     (!series.is_empty()).then_some(Panel { title, series })
 }
 
 /// Demos that the runs of an arm learned from, as their settings have it.
-fn demos(finished: &Finished, arm: Arm, task: Task) -> Option<u64> {
+fn demos(finished: &Finished, arm: Arm, task: &str) -> Option<u64> {
     let run = &finished.of(arm, task).next()?.run;
     let mut at = run.train;
     let steps = &finished.grid.steps;

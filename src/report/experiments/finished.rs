@@ -10,7 +10,6 @@ use crate::experiment::{Experiment, Grid, Run};
 use crate::learn::MethodName;
 use crate::report::statistics::{self, Estimate, Score, Strata};
 use crate::table::Table;
-use crate::task::Task;
 
 /// An experiment with the runs of it that are finished.
 pub struct Finished {
@@ -83,34 +82,34 @@ impl Finished {
         })
     }
 
-    /// The tasks that have a finished run, in the order of the file.
-    pub fn tasks(&self) -> Vec<Task> {
-        let has_run = |task: &Task| self.runs.iter().any(|measured| measured.run.task == *task);
-        self.experiment.tasks.iter().copied().filter(has_run).collect()
+    /// Names of the tasks that have a finished run, in the order of the file.
+    pub fn tasks(&self) -> Vec<&str> {
+        let has_run = |task: &&str| self.runs.iter().any(|measured| measured.run.task == *task);
+        self.experiment.tasks.iter().map(String::as_str).filter(has_run).collect()
     }
 
     /// The finished runs of an arm and a task, a seed each.
-    pub fn of<'a>(&'a self, arm: Arm<'a>, task: Task) -> impl Iterator<Item = &'a Measured> + Clone {
+    pub fn of<'a>(&'a self, arm: Arm<'a>, task: &'a str) -> impl Iterator<Item = &'a Measured> + Clone {
         self.runs.iter().filter(move |measured| measured.run.task == task && Arm::of(&measured.run) == arm)
     }
 
     /// Success of each seed.
-    pub fn scores(&self, arm: Arm, task: Task) -> Vec<Score> {
+    pub fn scores(&self, arm: Arm, task: &str) -> Vec<Score> {
         self.of(arm, task).map(|m| Score { seed: m.run.seed, value: m.summary.success_rate }).collect()
     }
 
     /// The same without the seeds.
-    pub fn singles(&self, arm: Arm, task: Task) -> Vec<f64> {
+    pub fn singles(&self, arm: Arm, task: &str) -> Vec<f64> {
         self.of(arm, task).map(|m| m.summary.success_rate).collect()
     }
 
     /// Success of each seed of each task, an empty list for a task without one.
-    pub fn strata(&self, arm: Arm, tasks: &[Task]) -> Strata {
-        tasks.iter().map(|task| self.scores(arm, *task)).collect()
+    pub fn strata(&self, arm: Arm, tasks: &[&str]) -> Strata {
+        tasks.iter().map(|task| self.scores(arm, task)).collect()
     }
 
     /// Success of an arm on a task: over seeds the mean and its interval; of one seed its policy's Wilson interval.
-    pub fn success(&self, arm: Arm, task: Task) -> Option<Estimate> {
+    pub fn success(&self, arm: Arm, task: &str) -> Option<Estimate> {
         let runs: Vec<&Measured> = self.of(arm, task).collect();
         match runs.as_slice() {
             [] => None,
@@ -123,7 +122,7 @@ impl Finished {
     }
 
     /// Mean time of the trainings of an arm and a task \[s\]: wall or processor time, as `of` has it; `None` where a log lacks it.
-    pub fn train_s(&self, arm: Arm, task: Task, of: fn(&Measured) -> Option<f64>) -> Option<f64> {
+    pub fn train_s(&self, arm: Arm, task: &str, of: fn(&Measured) -> Option<f64>) -> Option<f64> {
         let times: Vec<f64> = self.of(arm, task).map(of).collect::<Option<_>>()?;
         (!times.is_empty()).then(|| statistics::average(&times))
     }

@@ -4,13 +4,16 @@ use super::comparisons::compare;
 use super::finished::{Arm, Finished};
 use super::words::{minutes, percent, percent_within};
 use crate::report::page::{Block, Cell, Column, Table};
-use crate::report::paper::{PaperRow, PaperTable};
+use crate::report::paper::{PaperRow, PaperTable, TASKS};
 use crate::report::statistics::Verdict;
 
 /// The table for each preset and method, and what differs in order.
 pub fn blocks(finished: &Finished, paper: &PaperTable) -> Vec<Block> {
     let experiment = &finished.experiment;
     let mut blocks = Vec::new();
+    if tasks(finished).is_empty() {
+        return blocks;
+    }
     for preset in &experiment.presets {
         for method in &experiment.methods {
             let arms = finished.arms().into_iter().filter(|arm| (arm.preset, arm.method) == (preset, *method));
@@ -29,31 +32,36 @@ pub fn blocks(finished: &Finished, paper: &PaperTable) -> Vec<Block> {
     blocks
 }
 
+/// The experiment's tasks that the paper has, in the order of the file.
+fn tasks(finished: &Finished) -> Vec<&str> {
+    finished.experiment.tasks.iter().map(String::as_str).filter(|task| TASKS.contains(task)).collect()
+}
+
 fn table(finished: &Finished, paper: &PaperTable, of: &str, arms: &[Arm]) -> Table {
-    let tasks = &finished.experiment.tasks;
+    let tasks = tasks(finished);
     let mut columns = vec![Column::words(paper.varies)];
-    for task in tasks {
-        columns.extend([Column::of(task.name(), "paper, %"), Column::of(task.name(), "here, %")]);
+    for task in &tasks {
+        columns.extend([Column::of(task, "paper, %"), Column::of(task, "here, %")]);
         if paper.timed {
-            columns.extend([Column::of(task.name(), "paper, min"), Column::of(task.name(), "here, min")]);
+            columns.extend([Column::of(task, "paper, min"), Column::of(task, "here, min")]);
         }
     }
     let of_row = |row: &PaperRow| arms.iter().find(|arm| arm.variation == row.variation).copied();
     let highest = |values: &mut dyn Iterator<Item = Option<f64>>| values.flatten().fold(0.0, f64::max);
     let row = |row: &PaperRow| {
         let mut cells = vec![Cell::from(row.label)];
-        for task in tasks {
-            let theirs = row.success(*task);
-            let best = highest(&mut paper.rows.iter().map(|row| row.success(*task)));
+        for task in &tasks {
+            let theirs = row.success(task);
+            let best = highest(&mut paper.rows.iter().map(|row| row.success(task)));
             cells.push(Cell { text: theirs.map_or("failed".into(), percent), strong: theirs == Some(best) });
-            let value = |row: &PaperRow| of_row(row).and_then(|arm| finished.success(arm, *task)).map(|found| found.value);
+            let value = |row: &PaperRow| of_row(row).and_then(|arm| finished.success(arm, task)).map(|found| found.value);
             let best = highest(&mut paper.rows.iter().map(value));
-            let ours = of_row(row).and_then(|arm| finished.success(arm, *task));
+            let ours = of_row(row).and_then(|arm| finished.success(arm, task));
             let strong = ours.is_some_and(|found| found.value == best && best > 0.0);
             cells.push(Cell { text: ours.map_or("–".into(), percent_within), strong });
             if paper.timed {
-                cells.push(row.minutes(*task).map_or("–".into(), |minutes| format!("{minutes:.0}")).into());
-                cells.push(minutes(of_row(row).and_then(|arm| finished.train_s(arm, *task, |m| m.train_s))));
+                cells.push(row.minutes(task).map_or("–".into(), |minutes| format!("{minutes:.0}")).into());
+                cells.push(minutes(of_row(row).and_then(|arm| finished.train_s(arm, task, |m| m.train_s))));
             }
         }
         cells
@@ -74,12 +82,12 @@ fn table(finished: &Finished, paper: &PaperTable, of: &str, arms: &[Arm]) -> Tab
 /// Where the order by success is another than the paper's, in words.
 fn order(finished: &Finished, paper: &PaperTable, of: &str, arms: &[Arm]) -> Vec<Block> {
     let mut items = Vec::new();
-    for task in &finished.experiment.tasks {
+    for task in tasks(finished) {
         let mut shown: Vec<(&PaperRow, Arm, f64, f64)> = Vec::new();
         for row in paper.rows {
             let arm = arms.iter().find(|arm| arm.variation == row.variation);
-            if let Some((arm, found)) = arm.and_then(|arm| finished.success(*arm, *task).map(|found| (*arm, found.value))) {
-                shown.push((row, arm, row.success(*task).unwrap_or(0.0), found));
+            if let Some((arm, found)) = arm.and_then(|arm| finished.success(*arm, task).map(|found| (*arm, found.value))) {
+                shown.push((row, arm, row.success(task).unwrap_or(0.0), found));
             }
         }
         let theirs = ranked(&shown.iter().map(|(row, _, paper, _)| (row.label, *paper)).collect::<Vec<_>>());
@@ -87,7 +95,7 @@ fn order(finished: &Finished, paper: &PaperTable, of: &str, arms: &[Arm]) -> Vec
         let (mut reversed, mut open) = (Vec::new(), 0);
         for (a, x, theirs_x, here_x) in &shown {
             for (b, y, theirs_y, here_y) in shown.iter().filter(|(_, _, other, _)| theirs_x > other) {
-                match compare(finished, *x, *y, &[*task]).map(|found| found.verdict()) {
+                match compare(finished, *x, *y, &[task]).map(|found| found.verdict()) {
                     Some(Verdict::Worse) => {
                         reversed.push(format!("{} ({}) below {} ({})", a.label, percent(*here_x), b.label, percent(*here_y)))
                     }

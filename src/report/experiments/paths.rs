@@ -8,7 +8,6 @@ use crate::error::Result;
 use crate::interrupt::Interrupt;
 use crate::report::chart::{LOOKS, Path, Site, Space};
 use crate::report::page::{Block, Cell, Column, Table};
-use crate::task::Task;
 
 /// Episodes that are shown of each policy, as many as the paper's figure has.
 const EPISODES: usize = 3;
@@ -43,7 +42,7 @@ pub fn blocks(finished: &Finished, interrupt: &Interrupt) -> Result<Vec<Block>> 
 type Shown = (String, u64, Vec<Episode>);
 
 /// Each arm's run of its first seed.
-fn first_seeds<'a>(finished: &'a Finished, task: Task, preset: &'a str) -> impl Iterator<Item = &'a Measured> {
+fn first_seeds<'a>(finished: &'a Finished, task: &'a str, preset: &'a str) -> impl Iterator<Item = &'a Measured> {
     let arms = finished.arms().into_iter().filter(move |arm| arm.preset == preset);
     arms.filter_map(move |arm| finished.of(arm, task).min_by_key(|m| m.run.seed))
 }
@@ -56,10 +55,10 @@ fn episodes(finished: &Finished, measured: &Measured) -> Result<Option<Vec<Episo
     files.iter().take(EPISODES).map(|file| recording::read(file).map(|(episode, _)| episode)).collect::<Result<_>>().map(Some)
 }
 
-fn figure(finished: &Finished, task: Task, preset: &str, shown: &[Shown]) -> Block {
+fn figure(finished: &Finished, task: &str, preset: &str, shown: &[Shown]) -> Block {
     let path = |(i, episode): (usize, &Episode)| {
-        let points = episode.steps.iter().chain([&episode.last]).map(|step| step.state.block.position_m).collect();
-        Path { number: i % LOOKS + 1, points, target: episode.scene.target_m() }
+        let points = episode.steps.iter().chain([&episode.last]).map(|step| step.objects[0].pose.position_m).collect();
+        Path { number: i % LOOKS + 1, points, target: episode.scene.target_m(0) }
     };
     let panels = shown.iter().map(|(name, seed, episodes)| Site {
         title: format!("{name}, seed {seed}"),
@@ -77,14 +76,15 @@ fn figure(finished: &Finished, task: Task, preset: &str, shown: &[Shown]) -> Blo
     Block::Figure(space.draw(), caption.into())
 }
 
-fn table(task: Task, preset: &str, shown: &[Shown]) -> Table {
+fn table(task: &str, preset: &str, shown: &[Shown]) -> Table {
     let row = |(name, _, episodes): &Shown| {
         let outcome = |episode: &Episode| {
             let end = match episode.failure {
                 None => "solved".to_string(),
                 Some(class) => class.name().replace('_', " "),
             };
-            let highest = episode.steps.iter().chain([&episode.last]).map(|s| s.state.block.position_m[2]).fold(0.0, f64::max);
+            let highest =
+                episode.steps.iter().chain([&episode.last]).map(|s| s.objects[0].pose.position_m[2]).fold(0.0, f64::max);
             Cell::from(format!("{end}, {} steps, up to {highest:.2} m", episode.steps.len()))
         };
         let mut cells = vec![Cell::from(name.clone())];

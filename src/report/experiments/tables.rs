@@ -3,12 +3,11 @@
 use super::finished::{Finished, Measured};
 use crate::data::Provenance;
 use crate::table::{Table, Values};
-use crate::task::Task;
 use crate::tasks::FailureClass;
 use serde_json::json;
 
 /// A row a run of a task, and where it came from.
-pub fn run_table(finished: &Finished, task: Task) -> (Table, Provenance) {
+pub fn run_table(finished: &Finished, task: &str) -> (Table, Provenance) {
     let runs: Vec<&Measured> = finished.runs.iter().filter(|m| m.run.task == task).collect();
     let texts = |pick: &dyn Fn(&Measured) -> String| Values::Text(runs.iter().map(|m| pick(m)).collect());
     let counts = |pick: &dyn Fn(&Measured) -> u64| Values::I64(runs.iter().map(|m| pick(m) as i64).collect());

@@ -10,7 +10,6 @@ use crate::learn::MethodName;
 use crate::report::chart::{Axis, Chart, Panel, Point, Series};
 use crate::report::page::{Block, Cell, Column, Table};
 use crate::report::statistics::{Estimate, average};
-use crate::task::Task;
 
 /// Column of the metrics of a method that acts in the simulator: control steps so far.
 const ENV_STEPS: &str = "env_steps";
@@ -42,7 +41,7 @@ impl Clock {
 /// A length of training of one curve.
 struct Length<'a> {
     arm: Arm<'a>,
-    task: Task,
+    task: &'a str,
     curve: Curve<'a>,
     epochs: f64,
     env_steps: f64,
@@ -247,7 +246,7 @@ fn plateaus(finished: &Finished, lengths: &[Length], clock: Clock) -> Table {
                     let name = if experiment.presets.len() > 1 { format!("{name} ({preset})") } else { name };
                     let cells_of =
                         |l: &Length| [format!("{:.0}", l.epochs).into(), minutes(l.train_s), percent_within(l.success).into()];
-                    let mut cells = vec![Cell::from(name), task.name().into()];
+                    let mut cells = vec![Cell::from(name), task.into()];
                     cells.extend(plateau(&successes).map_or(["–", "–", "–"].map(Cell::from), |at| cells_of(of[at])));
                     cells.extend(cells_of(last));
                     rows.push(cells);

@@ -6,9 +6,9 @@ use super::raster::Rgb;
 pub const BACKGROUND: Rgb = [246, 247, 249];
 /// The table.
 pub const TABLE: Rgb = [226, 221, 212];
-/// The block to move.
-pub const BLOCK: Rgb = [245, 134, 32];
-/// The base block.
+/// Objects that goals move: orange, yellow, violet.
+pub const MOVED: [Rgb; 3] = [[245, 134, 32], [222, 184, 46], [146, 92, 182]];
+/// The other objects.
 pub const BASE: Rgb = [52, 116, 205];
 /// The target.
 pub const TARGET: Rgb = [48, 172, 92];
@@ -34,8 +34,8 @@ pub fn of_link(link: usize, arm: usize) -> Rgb {
 
 /// Palette index of "as in the picture before".
 pub const UNCHANGED: u8 = 255;
-/// Colours whose shades are in the palette.
-const SHADED: [Rgb; 9] = [TABLE, BLOCK, BASE, TARGET, OBSTACLE, ARM[0], ARM[1], ARM[2], ARM[3]];
+/// Colours whose shades are in the palette, as many as it has room for; those of others come from the coarse cube.
+const SHADED: [Rgb; 9] = [TABLE, MOVED[0], BASE, TARGET, OBSTACLE, ARM[0], ARM[1], ARM[2], ARM[3]];
 /// Shades of each of them, evenly from darkest to brightest.
 const SHADES: usize = 14;
 /// Brightness of the darkest and the brightest shade: what shading and shadow can make of a colour.

@@ -2,6 +2,7 @@
 
 use crate::math::sin_cos;
 use crate::robot::model::Shape;
+use crate::task;
 use nalgebra::{Isometry3, Rotation3, Vector3};
 use std::f64::consts::{FRAC_PI_2, TAU};
 
@@ -37,6 +38,44 @@ impl Mesh {
                 (Mesh::capsule(from_m.into(), to_m.into(), radius_m), Isometry3::identity())
             }
         }
+    }
+
+    /// The surface of an object, in its own frame.
+    pub fn of_object(shape: &task::Shape) -> Self {
+        if let task::Shape::Cylinder { radius_m, height_m } = *shape {
+            return Mesh::cylinder(radius_m, height_m / 2.0);
+        }
+        let mut mesh = Mesh::default();
+        shape.boxes_m().into_iter().for_each(|(center, half)| mesh.append(&Mesh::cuboid(center, half)));
+        mesh
+    }
+
+    /// An upright cylinder: radius and half height \[m\].
+    pub fn cylinder(radius_m: f64, half_m: f64) -> Self {
+        let mut mesh = Mesh::default();
+        let around = |k: usize| sin_cos(TAU * k as f64 / AROUND as f64);
+        for k in 0..AROUND {
+            let first = mesh.vertices.len() as u32;
+            for (sin, cos) in [around(k), around(k + 1)] {
+                let normal = Vector3::new(cos, sin, 0.0);
+                for z in [-half_m, half_m] {
+                    let at = normal * radius_m + Vector3::z() * z;
+                    mesh.vertices.push(Vertex { at: at.cast(), normal: normal.cast() });
+                }
+            }
+            mesh.triangles.extend([[first, first + 2, first + 3], [first, first + 3, first + 1]]);
+        }
+        for side in [-1.0, 1.0] {
+            let (first, normal) = (mesh.vertices.len() as u32, Vector3::z() * side);
+            for k in 0..AROUND {
+                // Counter-clockwise seen from outside.
+                let (sin, cos) = around(if side > 0.0 { k } else { AROUND - k });
+                let at = Vector3::new(cos * radius_m, sin * radius_m, side * half_m);
+                mesh.vertices.push(Vertex { at: at.cast(), normal: normal.cast() });
+            }
+            mesh.triangles.extend((1..AROUND as u32 - 1).map(|k| [first, first + k, first + k + 1]));
+        }
+        mesh
     }
 
     /// A box along the axes: centre and half edges \[m\].

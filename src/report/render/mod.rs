@@ -15,11 +15,10 @@ pub use self::gif::{GifOptions, write_gif};
 pub use self::robot::robot_png;
 pub use sheet::write_png_sheet;
 
-use crate::demo::{Episode, Step};
+use crate::demo::{Body, Episode, Step};
 use crate::error::{Error, Result};
 use crate::robot::Robot;
-use crate::scene::{BLOCK_EDGE_M, Scene};
-use crate::state::{Context, Pose};
+use crate::scene::Scene;
 use camera::Camera;
 use mesh::Mesh;
 use nalgebra::{Isometry3, Translation3};
@@ -98,7 +97,8 @@ struct Renderer {
     canvas: Samples,
     robot: Arc<Robot>,
     links: Vec<(usize, Mesh, Isometry3<f64>, Rgb)>,
-    block: Mesh,
+    /// Of each object of the task.
+    objects: Vec<(Mesh, Rgb)>,
     obstacles: Vec<Mesh>,
     marker_bars: Mesh,
     marker_faces: Mesh,
@@ -111,8 +111,15 @@ impl Renderer {
         let canvas = table(&samples, width * SUPERSAMPLING, height * SUPERSAMPLING);
         let mut plain = RgbImage { width: size.0, height: size.1, data: vec![0; width * height * 3] };
         resolve(&canvas, Area::all(width, height), &mut plain);
-        let half = BLOCK_EDGE_M / 2.0;
-        let (target, around) = (scene.target_m(), [half + MARKER_ROOM_M; 3]);
+        let task = &scene.task;
+        let color = |i: usize| if i < task.moved() { colors::MOVED[i % colors::MOVED.len()] } else { colors::BASE };
+        let objects = task.objects.iter().enumerate().map(|(i, object)| (Mesh::of_object(&object.shape), color(i)));
+        let (mut marker_bars, mut marker_faces) = (Mesh::default(), Mesh::default());
+        for (goal, of) in task.goals.iter().enumerate() {
+            let around = task.objects[of.object].shape.half_m().map(|half| half + MARKER_ROOM_M);
+            marker_bars.append(&Mesh::frame(scene.target_m(goal), around, MARKER_HALF_BAR_M));
+            marker_faces.append(&Mesh::cuboid(scene.target_m(goal), around));
+        }
         Renderer {
             size,
             pixels: Camera::new(width, height),
@@ -121,20 +128,16 @@ impl Renderer {
             samples,
             robot: Arc::clone(&scene.robot),
             links: links::of_robot(&scene.robot),
-            block: Mesh::cuboid([0.0; 3], [half; 3]),
+            objects: objects.collect(),
             obstacles: scene.obstacles.iter().map(|o| Mesh::cuboid(o.center_m, o.size_m.map(|v| v / 2.0))).collect(),
-            marker_bars: Mesh::frame(target, around, MARKER_HALF_BAR_M),
-            marker_faces: Mesh::cuboid(target, around),
+            marker_bars,
+            marker_faces,
         }
     }
 
     fn draw(&mut self, step: &Step) -> RgbImage {
-        let base = step.base_now.or(match step.state.context {
-            Context::Base(base) => Some(base),
-            Context::None | Context::Goal(_) => None,
-        });
         let mut canvas = std::mem::replace(&mut self.canvas, Samples::new(0, 0, colors::BACKGROUND));
-        let solids = self.solids(&step.state.q, &step.state.block, base.as_ref());
+        let solids = self.solids(&step.state.q, &step.objects);
         draw_solids(&mut canvas, [&self.samples, &self.pixels], self.size, &solids);
         let marker = |opacity| Paint { rgb: colors::TARGET, opacity, tag: 0 };
         canvas.draw(&self.samples, &self.marker_bars, &Isometry3::identity(), marker(1.0));
@@ -147,11 +150,10 @@ impl Renderer {
     }
 
     /// Everything that casts a shadow: mesh, where it is, colour.
-    fn solids(&self, q: &[f64], block: &Pose, base: Option<&Pose>) -> Vec<(&Mesh, Isometry3<f64>, Rgb)> {
+    fn solids(&self, q: &[f64], objects: &[Body]) -> Vec<(&Mesh, Isometry3<f64>, Rgb)> {
         let poses = self.robot.link_poses(q);
         let mut solids: Vec<_> = self.links.iter().map(|(link, mesh, local, rgb)| (mesh, poses[*link] * local, *rgb)).collect();
-        solids.push((&self.block, block.isometry(), colors::BLOCK));
-        solids.extend(base.map(|b| (&self.block, b.isometry(), colors::BASE)));
+        solids.extend(self.objects.iter().zip(objects).map(|((mesh, rgb), now)| (mesh, now.pose.isometry(), *rgb)));
         solids.extend(self.obstacles.iter().map(|mesh| (mesh, Isometry3::identity(), colors::OBSTACLE)));
         solids
     }
@@ -209,28 +211,21 @@ mod tests {
     use super::*;
     use crate::demo::Contacts;
     use crate::robot::file::built_in::paper_robot;
-    use crate::state::State;
-    use crate::task::Task;
+    use crate::scene::Placed;
+    use crate::state::Pose;
+    use crate::task::built_in::stack;
     use nalgebra::Vector3;
 
     fn still(block: Pose, base: Pose) -> (Scene, Step) {
-        let context = Context::Base(base);
-        let scene = Scene {
-            robot: paper_robot(),
-            task: Task::Stack,
-            block,
-            context,
-            obstacles: Vec::new(),
-            friction: 1.0,
-            block_mass_kg: 0.1,
-        };
+        let placed = |pose| Placed { pose, friction: 1.0, mass_kg: 0.1 };
+        let objects = vec![placed(block), placed(base)];
+        let scene = Scene { robot: paper_robot(), task: stack(), objects, goals: Vec::new(), obstacles: Vec::new() };
         let step = Step {
-            state: State { q: paper_robot().ready, dq: [0.0; 9].into(), block, context },
-            base_now: None,
+            state: scene.start(),
+            objects: scene.objects.iter().map(|o| Body { pose: o.pose, speed_m_s: 0.0 }).collect(),
             commanded: [0.0; 9].into(),
             executed: [0.0; 9].into(),
-            contacts: Contacts::none(3),
-            block_speed_m_s: 0.0,
+            contacts: Contacts::none(3, 2),
             reward: 0.0,
             conditions: Vec::new(),
             phase: None,
@@ -243,9 +238,9 @@ mod tests {
         let base = Pose::from_yaw([0.45, 0.27, 0.025], 0.0);
         for (x, y) in [(0.40, -0.10), (0.50, 0.0), (0.60, 0.12)] {
             let (scene, mut step) = still(Pose::from_yaw([x, y, 0.025], 0.4), base);
-            step.base_now = Some(Pose::from_yaw([0.36, 0.30, 0.025], 0.2));
+            step.objects[1].pose = Pose::from_yaw([0.36, 0.30, 0.025], 0.2);
             let picture = Renderer::new(&scene, (480, 360)).draw(&step);
-            for (pose, rgb) in [(step.state.block, colors::BLOCK), (step.base_now.unwrap(), colors::BASE)] {
+            for (pose, rgb) in [(step.objects[0].pose, colors::MOVED[0]), (step.objects[1].pose, colors::BASE)] {
                 let at = Vector3::from(pose.position_m).cast();
                 let [column, row, _] = Camera::new(480, 360).project(&at).expect("before the camera");
                 let start = (row as usize * 480 + column as usize) * 3;
@@ -271,7 +266,7 @@ mod tests {
     fn numbers_that_are_no_place_draw_nothing() {
         let (scene, mut step) = still(Pose::from_yaw([0.5, 0.0, 0.025], 0.0), Pose::from_yaw([0.45, 0.27, 0.025], 0.0));
         for wrong in [f64::NAN, f64::INFINITY, 1e30, -1e30] {
-            step.state.block.position_m = [wrong; 3];
+            step.objects[0].pose.position_m = [wrong; 3];
             step.state.q = [wrong; 9].into();
             let (width, height) = (64, 48);
             assert_eq!(Renderer::new(&scene, (width, height)).draw(&step).data.len(), (width * height * 3) as usize);

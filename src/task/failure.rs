@@ -1,32 +1,17 @@
-//! The tasks by name, and the ways to fail at them.
+//! The ways to fail at a task.
 
-use crate::words::unknown;
 use serde::{Deserialize, Serialize};
-use std::fmt;
-use std::str::FromStr;
-
-/// The three tasks of the paper (section 4.1).
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Task {
-    /// Lift the block to 20 cm and hold it.
-    PickUp,
-    /// Carry the block to a goal on the table and release it there.
-    PickAndPlace,
-    /// Put the block on the base block and release it.
-    Stack,
-}
 
 /// Why an episode failed. What ended it early comes before all: a command or a state that is no number; then the first that applies, in
 /// this order.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum FailureClass {
-    /// The hand never came within reach of the block.
+    /// The hand never came within reach of the object.
     NeverReached,
     /// Reached, but never held between the fingers.
     NeverGrasped,
-    /// The block lies over, fell off the base block, or the base block was pushed away.
+    /// The object lies over or fell off what it was put on, or what it is to be put on was pushed away.
     Toppled,
     /// Held once, lost in the air.
     Dropped,
@@ -76,38 +61,5 @@ impl FailureClass {
             FailureClass::CommandNotFinite => ["command_not_finite", "a command was no finite number"],
             FailureClass::SimulationBrokeDown => ["simulation_broke_down", "the simulation ended in numbers that are none"],
         }
-    }
-}
-
-impl Task {
-    /// All tasks.
-    pub const ALL: [Task; 3] = [Task::PickUp, Task::PickAndPlace, Task::Stack];
-
-    /// The name on the command line and in files.
-    pub fn name(self) -> &'static str {
-        ["pick-up", "pick-and-place", "stack"][self as usize]
-    }
-
-    /// The instruction in words (LeRobot's task string).
-    pub fn instruction(self) -> &'static str {
-        [
-            "Pick up the block and hold it 20 cm above the table.",
-            "Pick up the block and place it at the goal position.",
-            "Pick up the block and stack it on the base block.",
-        ][self as usize]
-    }
-}
-
-impl fmt::Display for Task {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(self.name())
-    }
-}
-
-impl FromStr for Task {
-    type Err = String;
-
-    fn from_str(s: &str) -> Result<Self, String> {
-        Task::ALL.into_iter().find(|t| t.name() == s).ok_or_else(|| unknown("task", s, &Task::ALL.map(Task::name)))
     }
 }
