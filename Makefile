@@ -1,5 +1,6 @@
 # From a task's name to an evaluated policy: make all TASK=stack. `make help` lists everything.
 
+# A task that comes with hilt, or the TOML file of another.
 TASK   ?= pick-up
 RUNS   ?= runs
 SEED   ?= 0
@@ -7,9 +8,11 @@ SEED   ?= 0
 PRESET ?= best
 # Robot: jaco, panda, ur5e, or the TOML file of another. Another than the pipeline's has a directory of its own, RUNS/ROBOT.
 ROBOT  ?=
-PIPELINE_paper  = pipelines/paper/$(TASK).toml
+PIPELINE_best   = $(or $(TASK_FILE),pipelines/$(TASK).toml)
+# Of the paper's own tasks; what it did for stacking is what the preset has for others.
+PIPELINE_paper  = $(if $(filter $(PAPER_TASKS),$(TASK)),pipelines/paper/$(TASK).toml,pipelines/paper/other.toml)
 PIPELINE_mended = pipelines/mended.toml
-PIPELINE ?= $(or $(PIPELINE_$(PRESET)),pipelines/$(TASK).toml)
+PIPELINE ?= $(PIPELINE_$(PRESET))
 # hil: hybrid imitation learning; bc: behavior cloning; sc: state cloning; bc-rl: behavior cloning, then reinforcement learning with its loss: all
 # share the demos. ppo: reinforcement learning, which needs none.
 # Each has a policy of its own in RUNS/TASK.
@@ -61,7 +64,11 @@ override EPISODES   := $(strip $(call typed,EPISODES))
 override JOBS       := $(strip $(call typed,JOBS))
 override THREADS    := $(strip $(call typed,THREADS))
 
-TASKS := pick-up pick-and-place stack
+PAPER_TASKS := pick-up pick-and-place stack
+TASKS := $(PAPER_TASKS) tower sort bin
+# Where TASK is a file, that.
+TASK_FILE = $(if $(filter %.toml,$(TASK)),$(TASK))
+TASK_NAME = $(basename $(notdir $(TASK)))
 PRESETS := best mended paper
 METHODS := hil bc sc ppo bc-rl
 # What a method learns from: by its artefact, the last stage before training.
@@ -77,7 +84,7 @@ one-of = $(if $(filter-out 1,$(words $($(1))))$(filter-out $(2),$($(1))),$(error
 not-digits = $(subst 0,,$(subst 1,,$(subst 2,,$(subst 3,,$(subst 4,,$(subst 5,,$(subst 6,,$(subst 7,,$(subst 8,,$(subst 9,,$(1)))))))))))
 number = $(if $($(1)),$(if $(call not-digits,$($(1))),$(error $(1) is "$($(1))": it must be a whole number)),$(error $(1) is empty: it must be a whole number))
 
-$(call one-of,TASK,$(TASKS))
+$(if $(TASK_FILE),$(if $(call is-odd,$(notdir $(TASK)))$(filter -%,$(TASK)),$(error TASK is "$(TASK)": a file's name must be without blanks and without any of $(ODD))),$(call one-of,TASK,$(TASKS)))
 $(call one-of,PRESET,$(PRESETS))
 $(call one-of,METHOD,$(METHODS))
 $(if $(RESUME),$(call one-of,RESUME,0 1))
@@ -87,7 +94,7 @@ $(call number,CHECKPOINT)
 $(if $(strip $(RUNS)),,$(error RUNS is empty: it must name a directory, for example RUNS=runs))
 $(if $(call is-odd,$(RUNS))$(filter -%,$(RUNS)),$(error RUNS is "$(RUNS)": it must name a directory without blanks, without a leading - and without any of $(ODD)))
 $(if $(call is-odd,$(notdir $(ROBOT)))$(filter -%,$(ROBOT)),$(error ROBOT is "$(ROBOT)": it must name a robot or its TOML file, whose name is without blanks and without any of $(ODD)))
-$(if $(strip $(PIPELINE)),,$(error PIPELINE is empty: it must name a file with settings, for example pipelines/$(TASK).toml))
+$(if $(strip $(PIPELINE)),,$(error PIPELINE is empty: it must name a file with settings, for example pipelines/stack.toml))
 
 # --- the run ------------------------------------------------------------------------------------------------------------------------
 
@@ -96,10 +103,10 @@ plain = $(if $(call is-odd,$(1)),,$(1))
 HILT := $(or $(call plain,$(CARGO_TARGET_DIR)),$(call plain,$(CARGO_BUILD_TARGET_DIR)),target)/release/hilt
 
 ROBOT_DIR := $(if $(strip $(ROBOT)),$(basename $(notdir $(ROBOT)))/)
-DIR := $(RUNS)/$(ROBOT_DIR)$(TASK)
+DIR := $(RUNS)/$(ROBOT_DIR)$(TASK_NAME)
 # What stands in the names of a method's own files.
 OF := $(patsubst %,-%,$(filter-out hil,$(METHOD)))
-FLAGS := --pipeline $(call word-of,$(PIPELINE)) --task $(TASK) $(if $(strip $(ROBOT)),--robot $(call word-of,$(ROBOT))) --seed $(SEED) $(if $(strip $(SET)),--sets $(call word-of,$(SET)))
+FLAGS := --pipeline $(call word-of,$(PIPELINE)) --task $(call word-of,$(TASK)) $(if $(strip $(ROBOT)),--robot $(call word-of,$(ROBOT))) --seed $(SEED) $(if $(strip $(SET)),--sets $(call word-of,$(SET)))
 RUN = --threads $(THREADS) --log $(DIR)/logs/$(1).log
 SETTINGS := $(HILT) settings $(FLAGS) --threads $(THREADS)
 MADE := pipelines/made.sh $(DIR) $(METHOD)
@@ -227,7 +234,7 @@ need-cargo:
 
 # A few episodes, a few updates: every stage runs, nothing is learned.
 SMOKE := plan.episodes=12 pretrain.epochs=2 train.warm_start_updates=50 train.epochs=1 train.min_updates=0 evaluate.episodes=8
-SMOKE_DIR := $(RUNS)/smoke/$(ROBOT_DIR)$(TASK)
+SMOKE_DIR := $(RUNS)/smoke/$(ROBOT_DIR)$(TASK_NAME)
 smoke: build ## a tiny run of all stages under RUNS/smoke/TASK, in less than a minute
 	@$(MAKE) --no-print-directory all RUNS=$(RUNS)/smoke SET=$(call word-of,$(SMOKE) $(SET))
 	$(HILT) evaluate $(FLAGS) --threads $(THREADS) --policy planner --episodes 8
@@ -266,7 +273,7 @@ clean-runs: ## remove what was made for TASK under RUNS; files that make did not
 	@$(MADE) clean
 
 help: ## this list
-	@echo "make TARGET [TASK=pick-up|pick-and-place|stack] [RUNS=DIR] [SEED=N] [THREADS=N] [PRESET=best|mended|paper] [PIPELINE=FILE]"
+	@echo "make TARGET [TASK=$(subst $( ) ,|,$(TASKS))|FILE.toml] [ROBOT=jaco|panda|ur5e|FILE.toml] [RUNS=DIR] [SEED=N] [THREADS=N] [PRESET=best|mended|paper] [PIPELINE=FILE]"
 	@echo "            [METHOD=hil|bc|sc|ppo|bc-rl] [RESUME=1] [CHECKPOINT=SECONDS] [SET=\"stage.key=value ...\"]"
 	@echo "            experiments: [NAME=$(subst $( ) ,|,$(EXPERIMENTS))] [SEEDS=0-4,9] [EPISODES=N] [JOBS=N]"
 	@awk -F ':.*## ' '/^[a-z0-9 -]+:.*## / { printf "  %-12s %s\n", $$1, $$2 }' $(firstword $(MAKEFILE_LIST))

@@ -5,10 +5,13 @@ use crate::words::unknown;
 use std::sync::{Arc, LazyLock};
 
 /// The pipeline file of each, in the order of lists: the paper's three (section 4.1) first.
-const FILES: [(&str, &str); 3] = [
+const FILES: [(&str, &str); 6] = [
     ("pick-up", include_str!("../../pipelines/pick-up.toml")),
     ("pick-and-place", include_str!("../../pipelines/pick-and-place.toml")),
     ("stack", include_str!("../../pipelines/stack.toml")),
+    ("tower", include_str!("../../pipelines/tower.toml")),
+    ("sort", include_str!("../../pipelines/sort.toml")),
+    ("bin", include_str!("../../pipelines/bin.toml")),
 ];
 /// How many of them are the paper's.
 const OF_THE_PAPER: usize = 3;

@@ -1,6 +1,6 @@
 //! What can be a task.
 
-use super::{GRASP_OVER_CENTER_M, MOST_OBJECTS, Object, Place, Shape, Spread, Target, Task};
+use super::{MOST_OBJECTS, Object, Place, Shape, Spread, Target, Task};
 use crate::words::shown;
 
 /// Longest name of a task or an object.
@@ -19,6 +19,8 @@ const MASSES_KG: [f64; 2] = [0.001, 10.0];
 const FRICTIONS: [f64; 2] = [0.0, 10.0];
 /// Distances to a place that count \[m\].
 const TOLERANCES_M: [f64; 2] = [0.001, 0.5];
+/// Fingertips reach below the tool point: it may be this much above the top of a flat object \[m\].
+const HIGHEST_GRIP_M: f64 = 0.02;
 /// An object that is lifted is at least this much higher than it stood \[m\].
 const LEAST_LIFT_M: f64 = 0.02;
 /// Highest lift \[m\]: beyond, no arm here holds its hand level.
@@ -81,7 +83,7 @@ fn check_object(object: &Object) -> Result<(), String> {
     };
     edges.into_iter().try_for_each(|edge| within("an edge or diameter [m]", edge, EDGES_M))?;
     let half = object.rest_m();
-    within("grip_m", object.grip_m, [GRASP_OVER_CENTER_M - half, half])?;
+    within("grip_m", object.grip_m, [-half, half + HIGHEST_GRIP_M])?;
     object.friction.map_or(Ok(()), |friction| spread("friction", friction, FRICTIONS))?;
     object.mass_kg.map_or(Ok(()), |mass| spread("mass_kg", mass, MASSES_KG))?;
     check_place(object.place)
@@ -139,6 +141,10 @@ fn check_goal(task: &Task, k: usize) -> Result<(), String> {
             let Shape::Bin { inner_m, .. } = task.objects[*other].shape else {
                 return Err(format!("\"{}\" is no bin; give it bin_m, or say on = \"{0}\"", name(*other)));
             };
+            if let Some(before) = task.goals[..k].iter().position(|goal| goal.target == Target::In(*other)) {
+                let there = name(task.goals[before].object);
+                return Err(format!("\"{}\" has \"{there}\" in its middle already (goal {before}); give each a bin", name(*other)));
+            }
             let narrow = inner_m[0].min(inner_m[1]);
             let wide = 2.0 * object.shape.half_width_m();
             if wide + BIN_ROOM_M > narrow {

@@ -248,3 +248,86 @@ fn instruction(task: &Task) -> String {
     let (first, rest) = all.split_at(1);
     format!("{}{rest}.", first.to_uppercase())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::built_in;
+    use super::*;
+
+    /// A task with these objects and goals, each a line of TOML between braces.
+    fn read(objects: &[&str], goals: &[&str]) -> Result<Task, String> {
+        let text = format!("name = \"t\"\nobjects = [{}]\ngoals = [{}]", objects.join(", "), goals.join(", "));
+        toml::from_str(&text).map_err(|why: toml::de::Error| why.message().to_string())
+    }
+
+    const CUBE: &str = r#"{ name = "cube", box_m = [0.05, 0.05, 0.05], at = "spawn" }"#;
+    const CAN: &str = r#"{ name = "can", cylinder_m = [0.03, 0.08], x_m = 0.5, y_m = [-0.1, 0.1] }"#;
+    const BIN: &str = r#"{ name = "bin", bin_m = [0.1, 0.1, 0.03], at = "base" }"#;
+
+    #[test]
+    fn what_goals_move_comes_first_and_the_rest_follows_from_the_file() {
+        let task = read(&[BIN, CUBE, CAN], &[r#"{ place = "can", in = "bin" }"#, r#"{ lift = "cube", height_m = 0.2 }"#]).expect("a task");
+        let names: Vec<&str> = task.objects.iter().map(|object| object.name.as_str()).collect();
+        assert_eq!((names, task.moved()), (vec!["cube", "can", "bin"], 2));
+        assert_eq!((task.goals[0].object, &task.goals[0].target), (1, &Target::In(2)));
+        assert_eq!(task.instruction, "Pick up the can and put it into the bin, then pick up the cube and hold it 20 cm above the table.");
+        let names = ["can.reached", "can.grasped", "can.lifted", "can.in_bin", "can.released", "can.on_table", "can.at_rest"];
+        assert_eq!(task.condition_names()[..7], names);
+    }
+
+    #[test]
+    fn a_task_is_the_same_after_writing_and_reading() {
+        let own = read(&[CUBE, CAN], &[r#"{ place = "cube", x_m = 0.5, y_m = 0.2 }"#, r#"{ place = "can", on = "cube" }"#]);
+        for task in built_in::all().iter().map(|task| (**task).clone()).chain(own) {
+            let text = toml::to_string(&task).expect("TOML");
+            assert_eq!(toml::from_str::<Task>(&text).expect("a task"), task, "{text}");
+            let text = serde_json::to_string(&task).expect("JSON");
+            assert_eq!(serde_json::from_str::<Task>(&text).expect("a task"), task);
+        }
+    }
+
+    #[test]
+    fn what_cannot_be_a_task_is_refused_with_what_is_allowed() {
+        let lift = r#"{ lift = "cube", height_m = 0.2 }"#;
+        let cases: [(&[&str], &[&str], &str); 24] = [
+            (&[], &[lift], r#"unknown object "cube""#),
+            (&[CUBE], &[], "0 goals; allowed: 1 to 6"),
+            (&[CUBE, CUBE], &[lift], r#"two objects are called "cube""#),
+            (&[CUBE], &[r#"{ lift = "cub", height_m = 0.2 }"#], "did you mean cube?"),
+            (&[CUBE], &[r#"{ lift = "cube" }"#], "how high? say height_m"),
+            (&[CUBE], &[r#"{ lift = "cube", height_m = 0.02 }"#], "height_m = 0.02; allowed: 0.045 to 0.6"),
+            (&[CUBE], &[r#"{ lift = "cube", height_m = 2.0 }"#], "height_m = 2; allowed: 0.045 to 0.6"),
+            (&[CUBE], &[r#"{ place = "cube" }"#], "what is to be done?"),
+            (&[CUBE], &[r#"{ place = "cube", at = "goal", on = "cube" }"#], "what is to be done?"),
+            (&[CUBE], &[r#"{ place = "cube", x_m = 0.4 }"#], "where? say at"),
+            (&[CUBE], &[r#"{ place = "cube", x_m = [0.5, 0.4], y_m = 0.0 }"#], "the lower end first"),
+            (&[CUBE], &[r#"{ place = "cube", at = "goal", tolerance_m = 0.0 }"#], "tolerance_m = 0; allowed: 0.001 to 0.5"),
+            (&[CUBE], &[r#"{ place = "cube", at = "goal", height_m = 0.2 }"#], "height_m goes with lift"),
+            (&[CUBE], &[r#"{ place = "cube", on = "cube" }"#], "on or into itself"),
+            (&[CUBE, CAN], &[lift, r#"{ place = "can", on = "cube" }"#], "must be the last goal"),
+            (&[CUBE, CAN], &[r#"{ place = "can", on = "cube" }"#, r#"{ place = "cube", at = "goal" }"#], "\"cube\" is moved later"),
+            (&[CUBE], &[r#"{ place = "cube", at = "goal" }"#, lift], "moved by goal 0 already; one goal an object"),
+            (&[CUBE, BIN], &[r#"{ place = "cube", on = "bin" }"#], "say in = \"bin\""),
+            (&[CUBE, CAN], &[r#"{ place = "cube", in = "can" }"#], "is no bin"),
+            (&[BIN], &[r#"{ lift = "bin", height_m = 0.2 }"#], "is a bin, which is fixed"),
+            (
+                &[CUBE, r#"{ name = "bin", bin_m = [0.05, 0.2, 0.03], at = "base" }"#],
+                &[r#"{ place = "cube", in = "bin" }"#],
+                "has 0.05 m between its walls",
+            ),
+            (&[r#"{ name = "cube", box_m = [0.2, 0.2, 0.2], at = "spawn" }"#], &[lift], "more than the 0.12 m that a hand opens"),
+            (&[r#"{ name = "cube", at = "spawn" }"#], &[lift], "which shape?"),
+            (&[r#"{ name = "a cube", box_m = [0.05, 0.05, 0.05], at = "spawn" }"#], &[r#"{ lift = "a cube", height_m = 0.2 }"#], "lower-case"),
+        ];
+        for (objects, goals, expected) in cases {
+            let why = read(objects, goals).expect_err(expected);
+            assert!(why.contains(expected), "{objects:?} {goals:?}: {why}");
+        }
+        let mass = r#"{ name = "cube", box_m = [0.05, 0.05, 0.05], at = "spawn", mass_kg = 0.0 }"#;
+        assert!(read(&[mass], &[lift]).expect_err("no mass").contains("mass_kg = 0; allowed: 0.001 to 10"));
+        let grip = r#"{ name = "cube", box_m = [0.05, 0.05, 0.05], at = "spawn", grip_m = 0.1 }"#;
+        assert!(read(&[grip], &[lift]).expect_err("held in the air").contains("grip_m = 0.1; allowed:"));
+        let color = r#"{ name = "cube", box_m = [0.05, 0.05, 0.05], at = "spawn", color = "red" }"#;
+        assert!(read(&[color], &[lift]).expect_err("no such key").contains("unknown field `color`"));
+    }
+}

@@ -1,6 +1,6 @@
 //! Variables of make: taken to the letter, or refused in one sentence that names them, before anything is done.
 
-use crate::{Run, TINY, command, text, tree};
+use crate::{ALL, Run, TINY, command, stages, text, tree};
 use std::fs;
 
 #[test]
@@ -38,6 +38,7 @@ fn what_make_cannot_take_is_refused_by_name_and_nothing_is_done() {
     cases.extend(["", "-1", "abc", "1 2", "1.5", "$(shell touch oops)"].map(|value| ("SEED", value)));
     cases.extend(["", "two"].map(|value| ("THREADS", value)));
     cases.extend(["a b.toml", "-x.toml", "x/$(shell touch oops).toml"].map(|value| ("ROBOT", value)));
+    cases.extend(["a b.toml", "-x.toml", "x/$(shell touch oops).toml"].map(|value| ("TASK", value)));
     cases.extend([("PRESET", "better"), ("PIPELINE", ""), ("RESUME", "yes"), ("CHECKPOINT", "often")]);
     for (name, value) in cases {
         for goal in ["all", "clean-runs"] {
@@ -126,4 +127,36 @@ fn a_robot_from_a_file_is_planned_for_and_a_changed_one_is_noticed() {
     let changed = fs::read_to_string(&file).expect("text").replace("speed = 0.1", "speed = 0.12");
     fs::write(&file, changed).expect("written");
     assert_ne!(plans(), first);
+}
+
+/// A task and a robot from files outside of the library, with no compilation, from demonstrations to an evaluated policy.
+#[test]
+fn a_task_from_a_file_is_learned_on_a_robot_from_a_file_and_a_changed_one_is_noticed() {
+    let tree = tree();
+    let mine = tree.path().join("mine");
+    fs::create_dir(&mine).expect("a directory");
+    for file in ["robots/five.toml", "robots/five.urdf", "robots/wrist.stl", "tasks/coffee.toml"] {
+        let from = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("fixtures").join(file);
+        fs::copy(&from, mine.join(from.file_name().expect("a name"))).expect("copied");
+    }
+    let set = format!("SET={TINY} simulate.pulses.probability=0");
+    let make = |words: &[&str]| {
+        let own = ["TASK=mine/coffee.toml", "ROBOT=mine/five.toml", &set];
+        let output = command(tree.path(), &[words, &own].concat()).output().expect("make runs");
+        assert!(output.status.success(), "{}", text(&output.stderr));
+        stages(&output)
+    };
+    assert_eq!(make(&["all"]), ALL);
+    for file in ["plans.parquet", "dataset/train/meta/info.json", "policy.safetensors", "evaluation.json"] {
+        assert!(tree.path().join("runs/five/coffee").join(file).is_file(), "{file}");
+    }
+    assert!(make(&["all"]).is_empty());
+    let file = mine.join("coffee.toml");
+    let changed = fs::read_to_string(&file).expect("text").replace("tolerance_m = 0.03", "tolerance_m = 0.04");
+    fs::write(&file, changed).expect("written");
+    assert_eq!(make(&["all"]), ALL);
+    // The other presets have settings for any task.
+    for preset in ["PRESET=mended", "PRESET=paper"] {
+        assert_eq!(make(&["runs/five/coffee/plans.parquet", preset]), ["plan"]);
+    }
 }
