@@ -15,7 +15,7 @@ use hilt::math::sin_cos;
 use hilt::nn::kernel;
 use hilt::robot::file::built_in::paper_robot;
 use hilt::state::CONTROL_DT_S;
-use hilt::tasks::Task;
+use hilt::task::built_in::stack;
 use std::collections::HashMap;
 use std::time::Instant;
 
@@ -26,7 +26,7 @@ const LEARNING_RATE: f64 = 1e-6;
 
 /// A demo of smooth joint motions; what it does is of no matter for the time.
 fn demo(index: usize) -> Demo {
-    let dim = Task::Stack.layout(&paper_robot()).state_dim();
+    let dim = stack().layout(&paper_robot()).state_dim();
     let (mut states, mut actions) = (Vec::new(), Vec::new());
     let mut q = paper_robot().ready;
     for t in 0..=STEPS {
@@ -43,7 +43,7 @@ fn demo(index: usize) -> Demo {
             actions.extend((0..JOINTS).map(|i| wave(i) as f32));
         }
     }
-    Demo::new(&Task::Stack.layout(&paper_robot()), states, actions.clone(), actions).expect("lengths match")
+    Demo::new(&stack().layout(&paper_robot()), states, actions.clone(), actions).expect("lengths match")
 }
 
 fn method() -> Hil {

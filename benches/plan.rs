@@ -7,7 +7,8 @@ use hilt::config::{PlanSettings, SceneSettings};
 use hilt::plan::Planner;
 use hilt::robot::file::built_in::paper_robot;
 use hilt::seed::stream;
-use hilt::tasks::{Task, draw_scene};
+use hilt::task::built_in::of_the_paper;
+use hilt::tasks::draw_scene;
 
 /// Scenes of a task.
 const SCENES: usize = 200;
@@ -16,11 +17,11 @@ const SLOW: f64 = 0.95;
 
 fn main() {
     common::head(&["plan", "median ms", "95th percentile ms"]);
-    for task in Task::ALL {
-        let mut planner = Planner::new(&paper_robot(), &PlanSettings::default());
+    for task in of_the_paper() {
+        let mut planner = Planner::new(&paper_robot(), &task, &PlanSettings::default());
         let mut index = 0;
         let seconds = common::seconds(SCENES, || {
-            let scene = draw_scene(&paper_robot(), task, &SceneSettings::default(), &mut stream(0, "scene", index))
+            let scene = draw_scene(&paper_robot(), &task, &SceneSettings::default(), &mut stream(0, "scene", index))
                 .expect("the default area has room");
             planner.plan(index, &scene, &mut stream(0, "plan", index)).expect("every default scene has a plan");
             index += 1;

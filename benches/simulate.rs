@@ -12,7 +12,8 @@ use hilt::joints::Joints;
 use hilt::robot::file::built_in::paper_robot;
 use hilt::scene::Scene;
 use hilt::sim::{Controller, Disturbance, World, run_episode};
-use hilt::tasks::{Task, draw_scene};
+use hilt::task::built_in::stack;
+use hilt::tasks::draw_scene;
 use scripted::Script;
 
 /// Repetitions of each.
@@ -24,7 +25,7 @@ const SWING_RAD_S: f64 = 0.3;
 const GRIP_RAD_S: f64 = 0.3;
 
 fn stack_scene() -> Scene {
-    draw_scene(&paper_robot(), Task::Stack, &SceneSettings::default(), &mut hilt::seed::stream(0, "bench", 0))
+    draw_scene(&paper_robot(), &stack(), &SceneSettings::default(), &mut hilt::seed::stream(0, "bench", 0))
         .expect("the spawn area has room")
 }
 
@@ -32,12 +33,12 @@ fn stack_scene() -> Scene {
 fn holding() -> World {
     let scene = stack_scene();
     let mut world = World::new(&scene);
-    let mut script = Script::lift(&scene.block);
+    let mut script = Script::lift(&scene.objects[0].pose);
     for _ in 0..150 {
         let seen = world.observe();
         world.step(&script.command(&seen));
     }
-    assert!(world.observe().gripped(), "the block is in the hand");
+    assert!(world.observe().gripped(0), "the block is in the hand");
     world
 }
 
@@ -50,7 +51,7 @@ fn held_block() -> Vec<f64> {
         _ => 0.0,
     });
     let stretch =
-        |world: &mut World| (0..STRETCH).fold(true, |held, _| (world.step(&action), held & world.observe().gripped()).1);
+        |world: &mut World| (0..STRETCH).fold(true, |held, _| (world.step(&action), held & world.observe().gripped(0)).1);
     assert!(stretch(&mut restored()), "the block stays in the hand");
     let mut worlds: Vec<World> = (0..REPETITIONS).map(|_| restored()).collect();
     common::seconds(REPETITIONS, || {
@@ -62,7 +63,7 @@ fn whole_episode() -> (usize, Vec<f64>) {
     let scene = stack_scene();
     let settings = SimulateSettings::default();
     let run = || {
-        let mut script = Script::carry(&scene.block, scene.target_m());
+        let mut script = Script::carry(&scene.objects[0].pose, scene.target_m(0));
         let mut noise = Disturbance::new(&paper_robot(), &settings, hilt::seed::stream(0, "simulate", 0));
         run_episode(0, &scene, &mut script, &mut noise, settings.max_steps, &Interrupt::default()).expect("not interrupted")
     };

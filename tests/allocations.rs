@@ -5,7 +5,7 @@ use hilt::demo::Demo;
 use hilt::interrupt::Interrupt;
 use hilt::learn::{Hil, Inputs, pretrain_dynamics};
 use hilt::robot::file::built_in::paper_robot;
-use hilt::tasks::Task;
+use hilt::task::built_in::pick_up;
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
 
@@ -57,7 +57,7 @@ const BATCH: usize = 4;
 
 /// A demo of 40 steps and more; what it does is of no matter here.
 fn demo(index: usize) -> Demo {
-    let layout = Task::PickUp.layout(&paper_robot());
+    let layout = pick_up().layout(&paper_robot());
     let (dim, steps) = (layout.state_dim(), 40 + 7 * index);
     let value = |i: usize| (((i + index) * 37 % 101) as f32 - 50.0) / 100.0;
     let states = (0..(steps + 1) * dim).map(value).collect();

@@ -2,7 +2,8 @@
 
 use hilt::config::{Pipeline, Preset, Source, Stage};
 use hilt::seed::stream;
-use hilt::tasks::{Task, draw_scene};
+use hilt::task::built_in::stack;
+use hilt::tasks::draw_scene;
 use std::path::Path;
 
 /// Each pipeline with the lines of the settings that it changes.
@@ -25,7 +26,7 @@ fn settings(source: &Source) -> (Pipeline, Vec<String>) {
 
 #[test]
 fn each_changes_what_its_name_says_and_has_room() {
-    let (_, ordinary) = settings(&Source::BuiltIn(Task::Stack, Preset::Best));
+    let (_, ordinary) = settings(&Source::BuiltIn(stack().into(), Preset::Best));
     let dir = Path::new(env!("CARGO_MANIFEST_DIR")).join("pipelines/off-track");
     assert_eq!(std::fs::read_dir(&dir).expect("readable").count(), VARIATIONS.len(), "a file without a line in this test");
     for (name, changes) in VARIATIONS {
@@ -34,7 +35,7 @@ fn each_changes_what_its_name_says_and_has_room() {
         assert_eq!(changed, changes, "{name}");
         assert_eq!(lines.len(), ordinary.len(), "{name}");
         for index in 0..50 {
-            draw_scene(&pipeline.robot, Task::Stack, &pipeline.scene, &mut stream(0, "off-track test", index))
+            draw_scene(&pipeline.robot, &stack(), &pipeline.scene, &mut stream(0, "off-track test", index))
                 .expect("there is room");
         }
     }

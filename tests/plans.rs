@@ -7,27 +7,30 @@ use hilt::demo::Phase;
 use hilt::interrupt::Interrupt;
 use hilt::joints::Joints;
 use hilt::math::{acos, cos};
-use hilt::plan::{
-    CLEARANCE_M, GRASP_OVER_CENTER_M, LIFTED_CENTER_M, Limits, Plan, PlanError, Planner, Plans, RELEASE_GAP_M, check_ready_pose,
-    from_table, to_table,
-};
+use hilt::plan::{CLEARANCE_M, Limits, Plan, PlanError, Planner, Plans, RELEASE_GAP_M, check_ready_pose, from_table, to_table};
 use hilt::robot::file::built_in::paper_robot;
-use hilt::scene::{Obstacle, Scene};
+use hilt::scene::{Obstacle, Placed, Scene};
 use hilt::seed::stream;
-use hilt::state::{CONTROL_DT_S, Context, Pose};
+use hilt::state::{CONTROL_DT_S, Pose};
 use hilt::table::Values;
-use hilt::tasks::{REST_HEIGHT_M, Task, draw_scene};
+use hilt::task::GRASP_OVER_CENTER_M;
+use hilt::task::built_in::{of_the_paper, pick_and_place, pick_up, stack};
+use hilt::tasks::{Task, draw_scene};
 use plan_oracle::Oracle;
 use rand::RngExt;
 use std::path::Path;
+use std::sync::Arc;
 
+/// Height of the block's centre at rest, and at the end of a pick-up \[m\]: 3.5 cm above what counts.
+const REST_HEIGHT_M: f64 = 0.025;
+const LIFTED_CENTER_M: f64 = 0.235;
 /// The hand counts as level and the tool as in place within this \[rad\], \[m\].
 const LEVEL_RAD: f64 = 0.035;
 const IN_PLACE_M: f64 = 3e-4;
 /// Rounding of finite differences \[rad/s\], \[rad/s^2\].
 const ROUNDING: f64 = 1e-9;
 
-fn scene(task: Task, index: u64) -> Scene {
+fn scene(task: &Arc<Task>, index: u64) -> Scene {
     let settings = SceneSettings { yaw: index % 2 == 1, ..SceneSettings::default() };
     draw_scene(&paper_robot(), task, &settings, &mut stream(1, "scene", index)).expect("the default area has room")
 }
@@ -37,17 +40,19 @@ fn over_the_wall(index: u64, height_m: f64) -> Scene {
     let mut rng = stream(2, "wall", index);
     let mut within = |low: f64, high: f64| low + (high - low) * rng.random::<f64>();
     let block = Pose::from_yaw([within(0.35, 0.60), within(-0.15, -0.065), REST_HEIGHT_M], 0.0);
-    let goal = Context::Goal([within(0.35, 0.60), within(0.065, 0.15), REST_HEIGHT_M]);
+    let goal = [within(0.35, 0.60), within(0.065, 0.15), REST_HEIGHT_M];
     let wall = Obstacle { center_m: [0.475, 0.0, height_m / 2.0], size_m: [0.35, 0.02, height_m] };
     Scene {
         robot: paper_robot(),
-        task: Task::PickAndPlace,
-        block,
-        context: goal,
+        task: pick_and_place(),
+        objects: vec![Placed { pose: block, friction: 1.0, mass_kg: 0.1 }],
+        goals: vec![goal],
         obstacles: vec![wall],
-        friction: 1.0,
-        block_mass_kg: 0.1,
     }
+}
+
+fn planner(task: &Task) -> Planner {
+    Planner::new(&paper_robot(), task, &PlanSettings::default())
 }
 
 fn plan(planner: &mut Planner, scene: &Scene, index: u64) -> Result<Plan, PlanError> {
@@ -57,11 +62,11 @@ fn plan(planner: &mut Planner, scene: &Scene, index: u64) -> Result<Plan, PlanEr
 #[test]
 fn a_thousand_random_plans_hold_every_limit_and_touch_nothing() {
     let settings = PlanSettings::default();
-    let mut planner = Planner::new(&paper_robot(), &settings);
+    let (tasks, mut planners) = (of_the_paper(), of_the_paper().map(|task| planner(&task)));
     for index in 0..1000 {
-        let task = Task::ALL[index as usize % 3];
-        let scene = scene(task, index);
-        let plan = plan(&mut planner, &scene, index).unwrap_or_else(|e| panic!("{task} {index}: {e}"));
+        let which = index as usize % 3;
+        let (task, scene) = (&tasks[which], scene(&tasks[which], index));
+        let plan = plan(&mut planners[which], &scene, index).unwrap_or_else(|e| panic!("{task} {index}: {e}"));
         check_phases(&plan);
         check_limits(&plan, &Limits::new(&paper_robot(), &settings));
         check_hand(&plan);
@@ -70,7 +75,7 @@ fn a_thousand_random_plans_hold_every_limit_and_touch_nothing() {
 }
 
 fn check_phases(plan: &Plan) {
-    let expected: &[Phase] = if plan.scene.task == Task::PickUp { &Phase::ALL[..3] } else { &Phase::ALL };
+    let expected: &[Phase] = if plan.scene.task == pick_up() { &Phase::ALL[..3] } else { &Phase::ALL };
     let mut phases: Vec<Phase> = plan.waypoints.iter().map(|w| w.phase).collect();
     phases.dedup();
     assert_eq!(phases, expected);
@@ -111,19 +116,20 @@ fn check_hand(plan: &Plan) {
     let near = |at: nalgebra::Vector3<f64>, [x, y, z]: [f64; 3]| {
         assert!((at - nalgebra::Vector3::new(x, y, z)).norm() < IN_PLACE_M, "{at} for {x} {y} {z}")
     };
-    let [x, y, z] = plan.scene.block.position_m;
+    let [x, y, z] = plan.scene.objects[0].pose.position_m;
     near(end_of(Phase::Approach).unwrap(), [x, y, z + GRASP_OVER_CENTER_M]);
-    let [tx, ty, tz] = plan.scene.target_m();
-    let end = match plan.scene.task {
-        Task::PickUp => [x, y, LIFTED_CENTER_M + GRASP_OVER_CENTER_M],
-        _ => [tx, ty, tz + RELEASE_GAP_M + GRASP_OVER_CENTER_M],
+    let [tx, ty, tz] = plan.scene.target_m(0);
+    let end = if plan.scene.task == pick_up() {
+        [x, y, LIFTED_CENTER_M + GRASP_OVER_CENTER_M]
+    } else {
+        [tx, ty, tz + RELEASE_GAP_M + GRASP_OVER_CENTER_M]
     };
     near(end_of(Phase::Carry).unwrap(), end);
 }
 
 #[test]
 fn a_wall_between_spawn_and_goal_is_passed_without_touching_it() {
-    let mut planner = Planner::new(&paper_robot(), &PlanSettings::default());
+    let mut planner = planner(&pick_and_place());
     let (mut planned, mut failures) = (0, Vec::new());
     for index in 0..100 {
         let scene = over_the_wall(index, 0.12 + 0.03 * (index % 2) as f64);
@@ -133,7 +139,7 @@ fn a_wall_between_spawn_and_goal_is_passed_without_touching_it() {
                 Oracle::new(&scene).check(&plan, CLEARANCE_M);
                 planned += 1;
             }
-            Err(e) => failures.push(format!("{:?}: {e}", scene.block.position_m)),
+            Err(e) => failures.push(format!("{:?}: {e}", scene.objects[0].pose.position_m)),
         }
     }
     assert!(planned >= 98, "{planned} of 100: {failures:#?}");
@@ -141,13 +147,13 @@ fn a_wall_between_spawn_and_goal_is_passed_without_touching_it() {
 
 #[test]
 fn a_post_too_high_to_pass_over_is_searched_around() {
-    let mut planner = Planner::new(&paper_robot(), &PlanSettings::default());
+    let (mut planner, mut again) = (planner(&pick_and_place()), planner(&pick_and_place()));
     let post = Obstacle { center_m: [0.62, 0.0, 0.35], size_m: [0.06, 0.04, 0.70] };
     let block = Pose::from_yaw([0.56, -0.15, REST_HEIGHT_M], 0.0);
     for index in 0..10 {
         let y = 0.13 + 0.01 * (index % 3) as f64;
-        let scene =
-            Scene { context: Context::Goal([0.56, y, REST_HEIGHT_M]), block, obstacles: vec![post], ..over_the_wall(0, 0.1) };
+        let mut scene = Scene { goals: vec![[0.56, y, REST_HEIGHT_M]], obstacles: vec![post], ..over_the_wall(0, 0.1) };
+        scene.objects[0].pose = block;
         let found = plan(&mut planner, &scene, index).unwrap_or_else(|e| panic!("{index}: {e}"));
         Oracle::new(&scene).check(&found, CLEARANCE_M);
         let straight = Scene { obstacles: Vec::new(), ..scene.clone() };
@@ -155,35 +161,33 @@ fn a_post_too_high_to_pass_over_is_searched_around() {
             found.waypoints.len() > plan(&mut planner, &straight, index).unwrap().waypoints.len(),
             "the post was not in the way"
         );
-        assert_eq!(
-            found,
-            plan(&mut Planner::new(&paper_robot(), &PlanSettings::default()), &scene, index).unwrap(),
-            "a search repeats itself"
-        );
+        assert_eq!(found, plan(&mut again, &scene, index).unwrap(), "a search repeats itself");
     }
 }
 
 #[test]
 fn earlier_plans_leave_no_trace() {
-    let mut used = Planner::new(&paper_robot(), &PlanSettings::default());
-    for index in [5, 11, 4, 3] {
-        let scene = scene(Task::ALL[index as usize % 3], index);
-        let fresh = plan(&mut Planner::new(&paper_robot(), &PlanSettings::default()), &scene, index);
-        assert_eq!(plan(&mut used, &scene, index), fresh);
+    for task in of_the_paper() {
+        let mut used = planner(&task);
+        for index in [5, 11, 4, 3] {
+            let scene = scene(&task, index);
+            let fresh = plan(&mut planner(&task), &scene, index);
+            assert_eq!(plan(&mut used, &scene, index), fresh);
+        }
     }
 }
 
 #[test]
 fn what_cannot_be_planned_is_named() {
-    let mut planner = Planner::new(&paper_robot(), &PlanSettings::default());
-    let mut far = scene(Task::PickUp, 0);
-    far.block.position_m[0] = 1.2;
+    let mut planner = planner(&pick_up());
+    let mut far = scene(&pick_up(), 0);
+    far.objects[0].pose.position_m[0] = 1.2;
     let error = plan(&mut planner, &far, 0).unwrap_err();
     assert!(matches!(error, PlanError::Grasp(_)), "{error}");
     assert!(error.to_string().contains("1.200") && error.to_string().contains("scene.spawn_x_m"), "{error}");
     // A lid over the block: the hand cannot come down.
-    let mut covered = scene(Task::PickUp, 0);
-    let [x, y, _] = covered.block.position_m;
+    let mut covered = scene(&pick_up(), 0);
+    let [x, y, _] = covered.objects[0].pose.position_m;
     covered.obstacles.push(Obstacle { center_m: [x, y, 0.10], size_m: [0.3, 0.3, 0.02] });
     let error = plan(&mut planner, &covered, 0).unwrap_err();
     assert!(matches!(error, PlanError::Grasp(_)) && error.to_string().contains("obstacle 0"), "{error}");
@@ -195,12 +199,13 @@ fn neighbouring_blocks_are_grasped_by_neighbouring_postures() {
     // block at y = 0.27 m the hand had to turn for some blocks beside it.
     const STEP_M: f64 = 0.02;
     const NEIGHBOUR_RAD: f64 = 0.2;
-    let mut planner = Planner::new(&paper_robot(), &PlanSettings::default());
-    for task in Task::ALL {
+    for task in of_the_paper() {
+        let mut planner = planner(&task);
         let mut grasp = |i: i32, k: i32| {
             let settings = SceneSettings { goal_x_m: [0.47, 0.47], goal_y_m: [0.0, 0.0], ..SceneSettings::default() };
-            let mut scene = draw_scene(&paper_robot(), task, &settings, &mut stream(0, "plan.scene", 0)).unwrap();
-            scene.block = Pose::from_yaw([0.32 + STEP_M * f64::from(i), -0.15 + STEP_M * f64::from(k), REST_HEIGHT_M], 0.0);
+            let mut scene = draw_scene(&paper_robot(), &task, &settings, &mut stream(0, "plan.scene", 0)).unwrap();
+            scene.objects[0].pose =
+                Pose::from_yaw([0.32 + STEP_M * f64::from(i), -0.15 + STEP_M * f64::from(k), REST_HEIGHT_M], 0.0);
             let plan = plan(&mut planner, &scene, 0).unwrap();
             plan.waypoints.iter().rev().find(|w| w.phase == Phase::Approach).unwrap().q
         };
@@ -219,11 +224,15 @@ fn neighbouring_blocks_are_grasped_by_neighbouring_postures() {
 
 #[test]
 fn tables_hold_plans_exactly_and_refuse_what_is_none() {
-    let mut planner = Planner::new(&paper_robot(), &PlanSettings::default());
-    let mut plans: Vec<Plan> = (0..4).map(|i| plan(&mut planner, &scene(Task::ALL[i as usize % 3], i), i).unwrap()).collect();
+    of_the_paper().iter().for_each(tables_hold_plans_of);
+}
+
+fn tables_hold_plans_of(task: &Arc<Task>) {
+    let (robot, mut planner) = (paper_robot(), planner(task));
+    let mut plans: Vec<Plan> = (0..4).map(|i| plan(&mut planner, &scene(task, i), i).unwrap()).collect();
     plans[1].scene.obstacles = over_the_wall(0, 0.123_456_789).obstacles;
-    let table = to_table(&paper_robot(), &plans);
-    assert_eq!(from_table(&paper_robot(), &table).unwrap(), plans);
+    let table = to_table(&robot, &plans);
+    assert_eq!(from_table(&robot, task, &table).unwrap(), plans);
 
     // In pieces that end anywhere.
     for size in [1, 7, 100, table.rows()] {
@@ -241,14 +250,14 @@ fn tables_hold_plans_exactly_and_refuse_what_is_none() {
             Ok(piece)
         };
         let pieces = (0..table.rows()).step_by(size).map(piece);
-        let found: Vec<Plan> = Plans::new(Path::new("plans"), &paper_robot(), pieces).collect::<Result<_, _>>().unwrap();
+        let found: Vec<Plan> = Plans::new(Path::new("plans"), (&robot, task), pieces).collect::<Result<_, _>>().unwrap();
         assert_eq!(found, plans, "in pieces of {size} rows");
     }
 
     let with = |name: &str, change: fn(&mut Values)| {
         let mut table = table.clone();
         change(&mut table.columns.iter_mut().find(|c| c.name == name).unwrap().values);
-        from_table(&paper_robot(), &table).unwrap_err()
+        from_table(&robot, task, &table).unwrap_err()
     };
     let nan = with("joint_2.q_rad", |v| {
         if let Values::F64(v) = v {
@@ -276,7 +285,7 @@ fn tables_hold_plans_exactly_and_refuse_what_is_none() {
     assert!(mixed.contains("row 1"), "{mixed}");
     let mut missing = table.clone();
     missing.columns.retain(|c| c.name != "finger_3.dq_rad_s");
-    assert!(from_table(&paper_robot(), &missing).unwrap_err().contains("finger_3.dq_rad_s"));
+    assert!(from_table(&robot, task, &missing).unwrap_err().contains("finger_3.dq_rad_s"));
 }
 
 /// A wall too high to pass over or around: the search would go on for minutes.
@@ -284,7 +293,7 @@ fn tables_hold_plans_exactly_and_refuse_what_is_none() {
 fn an_interrupt_ends_a_search_within_a_second() {
     let interrupt = Interrupt::default();
     let settings = PlanSettings { search_iterations: 100_000, shortcut_iterations: 100_000, ..PlanSettings::default() };
-    let mut planner = Planner::new(&paper_robot(), &settings).with_interrupt(&interrupt);
+    let mut planner = Planner::new(&paper_robot(), &pick_and_place(), &settings).with_interrupt(&interrupt);
     let mut scene = over_the_wall(0, 2.0);
     scene.obstacles[0].size_m[0] = 1.4;
     scene.obstacles[0].center_m[0] = 0.9;
@@ -303,9 +312,9 @@ fn an_interrupt_ends_a_search_within_a_second() {
 #[test]
 fn a_plan_that_nothing_could_execute_is_given_up() {
     for (speed, max_acceleration_rad_s2) in [(1e-5, 3.0), (0.8, 1e-300), (1e-300, 1e-300), (1e-3, 3.0)] {
-        let mut planner =
-            Planner::new(&paper_robot(), &PlanSettings { speed, max_acceleration_rad_s2, ..PlanSettings::default() });
-        let why = plan(&mut planner, &scene(Task::Stack, 0), 0).expect_err("too long").to_string();
+        let settings = PlanSettings { speed, max_acceleration_rad_s2, ..PlanSettings::default() };
+        let mut planner = Planner::new(&paper_robot(), &stack(), &settings);
+        let why = plan(&mut planner, &scene(&stack(), 0), 0).expect_err("too long").to_string();
         assert!(why.contains("simulate.max_steps can allow no more than 10000") && why.contains("raise plan.speed"), "{why}");
     }
 }

@@ -1,13 +1,15 @@
 //! Pictures of a hand-made episode.
 
-use hilt::demo::{Contacts, Episode, Phase, Step};
+use hilt::demo::{Body, Contacts, Episode, Phase, Step};
 use hilt::interrupt::Interrupt;
 use hilt::joints::Joints;
 use hilt::report::render::{GifOptions, RgbImage, frame, write_gif, write_png_sheet};
 use hilt::robot::file::built_in::paper_robot;
-use hilt::scene::{Obstacle, Scene};
-use hilt::state::{Context, Pose, State};
+use hilt::scene::{Obstacle, Placed, Scene};
+use hilt::state::{Pose, State};
+use hilt::task::built_in::{of_the_paper, pick_and_place, pick_up, stack};
 use hilt::tasks::Task;
+use std::sync::Arc;
 
 const SIZE: (u32, u32) = (480, 360);
 
@@ -26,20 +28,25 @@ fn reach(mut q: Joints, target: [f64; 3]) -> Joints {
     q
 }
 
-fn episode(task: Task, steps: usize) -> Episode {
+fn episode(task: &Arc<Task>, steps: usize) -> Episode {
     let block = Pose::from_yaw([0.50, -0.06, 0.025], 0.3);
-    let context = match task {
-        Task::PickUp => Context::None,
-        Task::PickAndPlace => Context::Goal([0.40, 0.12, 0.025]),
-        Task::Stack => Context::Base(Pose::from_yaw([0.45, 0.27, 0.025], 0.0)),
+    let placed = |pose| Placed { pose, friction: 1.0, mass_kg: 0.1 };
+    let mut scene = Scene {
+        robot: paper_robot(),
+        task: Arc::clone(task),
+        objects: vec![placed(block)],
+        goals: Vec::new(),
+        obstacles: Vec::new(),
     };
-    let obstacles = match task {
-        Task::PickAndPlace => vec![Obstacle { center_m: [0.62, 0.22, 0.06], size_m: [0.06, 0.10, 0.12] }],
-        _ => Vec::new(),
-    };
-    let scene = Scene { robot: paper_robot(), task, block, context, obstacles, friction: 1.0, block_mass_kg: 0.1 };
+    if *task == pick_and_place() {
+        scene.goals = vec![[0.40, 0.12, 0.025]];
+        scene.obstacles = vec![Obstacle { center_m: [0.62, 0.22, 0.06], size_m: [0.06, 0.10, 0.12] }];
+    }
+    if *task == stack() {
+        scene.objects.push(placed(Pose::from_yaw([0.45, 0.27, 0.025], 0.0)));
+    }
     let above = reach(paper_robot().ready, [0.50, -0.06, 0.03]);
-    let target = scene.target_m();
+    let target = scene.target_m(0);
     let end = reach(above, target);
     let mix = |a: Joints, b: Joints, s: f64| Joints::from_fn(9, |i| a[i] + (b[i] - a[i]) * s);
     let step = |t: usize| {
@@ -51,19 +58,21 @@ fn episode(task: Task, steps: usize) -> Episode {
             (q, Pose::from_isometry(&paper_robot().tool_pose(&q)))
         };
         q[6..].fill(0.4 + 0.5 * share.min(1.0));
+        let mut state = State { q, ..scene.start() };
+        state.objects[0] = block;
         Step {
-            state: State { q, dq: Joints::zeros(9), block, context },
-            base_now: None,
+            objects: state.objects.iter().map(|pose| Body { pose: *pose, speed_m_s: 0.0 }).collect(),
+            state,
             commanded: Joints::zeros(9),
             executed: Joints::zeros(9),
-            contacts: Contacts::none(3),
-            block_speed_m_s: 0.0,
+            contacts: Contacts::none(3, scene.objects.len()),
             reward: 0.0,
             conditions: Vec::new(),
             phase: Some(if share < 1.0 { Phase::Approach } else { Phase::Carry }),
         }
     };
-    Episode { index: 0, scene, steps: (0..steps).map(step).collect(), last: step(steps), success: true, failure: None }
+    let (moments, last) = ((0..steps).map(step).collect(), step(steps));
+    Episode { index: 0, scene, steps: moments, last, success: true, failure: None }
 }
 
 fn pixel(image: &RgbImage, x: u32, y: u32) -> [u8; 3] {
@@ -82,29 +91,29 @@ fn orange(image: &RgbImage) -> ([f64; 2], usize) {
 
 #[test]
 fn the_block_appears_where_it_stands_and_moves_with_it() {
-    let mut at = episode(Task::PickUp, 2);
+    let mut at = episode(&pick_up(), 2);
     let mut seen = |y_m: f64| {
-        at.steps[0].state.block = Pose::from_yaw([0.5, y_m, 0.025], 0.0);
+        at.steps[0].objects[0].pose = Pose::from_yaw([0.5, y_m, 0.025], 0.0);
         let (middle, count) = orange(&frame(&at, 0, SIZE));
         assert!(count > 150, "only {count} orange pixels with the block at y = {y_m} m");
         middle
     };
     let (right, left) = (seen(-0.15), seen(0.15));
     assert!(right[0] + 10.0 < left[0] || left[0] + 10.0 < right[0], "{right:?} {left:?}");
-    at.steps[0].state.block = Pose::from_yaw([5.0, 50.0, -90.0], 0.0);
+    at.steps[0].objects[0].pose = Pose::from_yaw([5.0, 50.0, -90.0], 0.0);
     assert_eq!(orange(&frame(&at, 0, SIZE)).1, 0, "no block, no orange");
 }
 
 #[test]
 fn steps_beyond_the_end_show_the_last_state() {
-    let e = episode(Task::Stack, 6);
+    let e = episode(&stack(), 6);
     assert_eq!(frame(&e, 6, (64, 48)), frame(&e, 99, (64, 48)));
     assert_ne!(frame(&e, 5, (64, 48)), frame(&e, 6, (64, 48)));
 }
 
 #[test]
 fn an_animation_decodes_back_to_its_pictures_and_is_deterministic() {
-    let e = episode(Task::Stack, 12);
+    let e = episode(&stack(), 12);
     let options = GifOptions { width: 160, height: 120, every_n_steps: 4, fps: 10 };
     let write = || {
         let mut bytes = Vec::new();
@@ -137,7 +146,7 @@ fn an_animation_decodes_back_to_its_pictures_and_is_deterministic() {
 
 #[test]
 fn a_sheet_decodes_back_and_is_deterministic() {
-    let e = episode(Task::PickAndPlace, 12);
+    let e = episode(&pick_and_place(), 12);
     let write = || {
         let mut bytes = Vec::new();
         write_png_sheet(&e, (3, 2), (160, 120), &Interrupt::default(), &mut bytes).unwrap();
@@ -158,7 +167,7 @@ fn a_sheet_decodes_back_and_is_deterministic() {
 
 #[test]
 fn impossible_sizes_are_refused() {
-    let e = episode(Task::PickUp, 2);
+    let e = episode(&pick_up(), 2);
     let bad = GifOptions { width: 0, ..GifOptions::default() };
     assert!(write_gif(&e, &bad, &Interrupt::default(), Vec::new()).unwrap_err().to_string().contains("0 x 360"));
     let bad = GifOptions { every_n_steps: 0, ..GifOptions::default() };
@@ -173,8 +182,8 @@ fn impossible_sizes_are_refused() {
 #[ignore = "writes pictures into the directory named by HILT_PICTURES"]
 fn pictures_to_look_at() {
     let directory = std::path::PathBuf::from(std::env::var("HILT_PICTURES").expect("HILT_PICTURES names a directory"));
-    for task in Task::ALL {
-        let e = episode(task, 80);
+    for task in of_the_paper() {
+        let e = episode(&task, 80);
         let file = |ending: &str| std::fs::File::create(directory.join(format!("{task}.{ending}"))).unwrap();
         write_png_sheet(&e, (2, 2), SIZE, &Interrupt::default(), file("png")).unwrap();
         let start = std::time::Instant::now();

@@ -11,6 +11,7 @@ use hilt::plan::{Plans, from_table};
 use hilt::robot::file::built_in::paper_robot;
 use hilt::seed::stream;
 use hilt::table::Table;
+use hilt::task::built_in::{pick_up, stack};
 use hilt::tensor::NamedTensor;
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
@@ -105,7 +106,7 @@ impl Reader {
                 self.whole = json_file::encode(Path::new("summary"), &content, &made).expect("a summary");
             }
             _ => {
-                self.whole = Pipeline::defaults(hilt::tasks::Task::Stack).to_toml(None).expect("TOML").into_bytes();
+                self.whole = Pipeline::defaults(&stack()).to_toml(None).expect("TOML").into_bytes();
                 self.other = self.whole.clone();
             }
         }
@@ -211,9 +212,10 @@ impl Reader {
         match self.name {
             "recording" => recording::read(path)?.0.to_demo().map(drop).map_err(misfit),
             "plans" => {
-                let whole = table_file::read(path).and_then(|(table, _)| from_table(&paper_robot(), &table).map_err(misfit));
+                let whole =
+                    table_file::read(path).and_then(|(table, _)| from_table(&paper_robot(), &pick_up(), &table).map_err(misfit));
                 let plans = table_file::Reader::open(path)?;
-                let in_pieces = Plans::new(path, &paper_robot(), plans.tables()?).collect::<Result<Vec<_>>>();
+                let in_pieces = Plans::new(path, (&paper_robot(), &pick_up()), plans.tables()?).collect::<Result<Vec<_>>>();
                 if let (Ok(whole), Ok(in_pieces)) = (&whole, &in_pieces) {
                     assert!(whole == in_pieces, "other plans when read in pieces");
                 }
@@ -242,7 +244,7 @@ impl Reader {
             "summary" => inspect(path, &Interrupt::default()).and_then(|_| json_file::read(path)).map(drop),
             _ if number % 2 == 1 => {
                 let sets = [String::from_utf8_lossy(input).into_owned()];
-                Pipeline::load(&Source::BuiltIn(hilt::tasks::Task::Stack, Default::default()), &sets).map(drop)
+                Pipeline::load(&Source::BuiltIn(stack().into(), Default::default()), &sets).map(drop)
             }
             _ => Pipeline::load(&Source::File(path.to_path_buf(), None), &[]).map(drop),
         }

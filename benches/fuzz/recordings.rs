@@ -24,7 +24,7 @@ const CHUNK_FIELDS: usize = 28;
 /// Bytes behind the summary's checksum.
 const MAGIC: usize = mcap::MAGIC.len();
 
-/// The same messages, some of them changed, dropped or doubled; `None` when the library does not read the file.
+/// The same messages, some of them changed, dropped or doubled, and attachments, some of them with a hostile value or left out; `None` when the library does not read the file.
 pub fn with_other_messages(file: &[u8], rng: &mut ChaCha8Rng) -> Option<Vec<u8>> {
     let messages = mcap::MessageStream::new(file).ok()?.collect::<Result<Vec<_>, _>>().ok()?;
     let options = WriteOptions::new().compression(Some(mcap::Compression::Zstd)).compression_threads(0).library("hilt 0.1.0");
@@ -42,6 +42,16 @@ pub fn with_other_messages(file: &[u8], rng: &mut ChaCha8Rng) -> Option<Vec<u8>>
         let data = if changed { mutate::bytes(message.data.to_vec(), &messages[hit].data, rng) } else { message.data.to_vec() };
         let times = if changed { rng.random_range(0..3) } else { 1 };
         (0..times).try_for_each(|_| writer.write_to_known_channel(&header, &data)).ok()?;
+    }
+    for index in &summary.attachment_indexes {
+        let mut attachment = mcap::read::attachment(file, index).ok()?;
+        if let (true, Ok(mut value)) = (one_in(8, rng), serde_json::from_slice(&attachment.data)) {
+            mutate::value(&mut value, rng);
+            attachment.data = serde_json::to_vec(&value).ok()?.into();
+        }
+        if !one_in(16, rng) {
+            writer.attach(&attachment).ok()?;
+        }
     }
     for index in &summary.metadata_indexes {
         writer.write_metadata(&mcap::read::metadata(file, index).ok()?).ok()?;

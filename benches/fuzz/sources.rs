@@ -8,6 +8,7 @@ use hilt::interrupt::Interrupt;
 use hilt::learn::{Checkpoint, Dynamics, Hooks, Inputs, MethodName, pretrain_dynamics, train};
 use hilt::plan::{Plan, from_table, to_table};
 use hilt::robot::file::built_in::paper_robot;
+use hilt::task::built_in::pick_up;
 use serde_json::json;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
@@ -34,7 +35,7 @@ pub fn recording() -> Vec<u8> {
 /// Plans of a few waypoints each.
 pub fn plans() -> Vec<Plan> {
     let (table, _) = table_file::read(&fixture("plans.parquet")).expect("a fixture");
-    let mut plans = from_table(&paper_robot(), &table).expect("plans");
+    let mut plans = from_table(&paper_robot(), &pick_up(), &table).expect("plans");
     plans.iter_mut().for_each(|plan| plan.waypoints.truncate(STEPS));
     plans
 }
@@ -63,8 +64,8 @@ pub fn demo() -> Demo {
 pub fn dataset(root: &Path) {
     let demo = demo();
     let of = |source_index| DatasetEpisode { source_index, demo: demo.clone(), rewards: vec![0.5; STEPS], success: true };
-    let task = demo.layout().name.parse().expect("a task's demo");
-    dataset::write(root, (&paper_robot(), task), &[of(0), of(1)].as_slice().into(), &provenance("convert")).expect("a dataset");
+    dataset::write(root, (&paper_robot(), &pick_up()), &[of(0), of(1)].as_slice().into(), &provenance("convert"))
+        .expect("a dataset");
 }
 
 /// A dynamics network of a few units.

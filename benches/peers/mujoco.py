@@ -126,7 +126,7 @@ class Replay:
 
     def __init__(self, urdf, steps, dt, cone):
         first, self.last = steps[0], steps[-1]
-        poses = [first.block] + ([first.base_now] if first.HasField("base_now") else [])
+        poses = [body.pose for body in first.objects]
         self.model = model_of(urdf, len(poses), dt, cone)
         # The URDF lists joints as recordings do; MuJoCo's order is by depth, which for this arm is the same.
         self.data = mujoco.MjData(self.model)
@@ -142,7 +142,7 @@ class Replay:
         for action in self.actions:
             self.data.ctrl[:] = action
             mujoco.mj_step(self.model, self.data, nstep=self.substeps)
-        return np.linalg.norm(self.data.qpos[9:12] - self.last.block.position_m)
+        return np.linalg.norm(self.data.qpos[9:12] - self.last.objects[0].pose.position_m)
 
 
 def steps_per_s(replays):

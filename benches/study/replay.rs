@@ -41,7 +41,7 @@ fn read(dir: &Path) -> Result<Vec<Episode>> {
 fn again(episode: &Episode) -> Result<()> {
     let mut world = World::new(&episode.scene);
     episode.steps.iter().for_each(|step| world.step(&step.executed));
-    let (now, then) = (world.observe().state, episode.last.state);
+    let (now, then) = (world.observe().state, &episode.last.state);
     ensure!(now.q == then.q, "episode {} ends elsewhere than its recording by this version of hilt", episode.index);
     Ok(())
 }

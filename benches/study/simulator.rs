@@ -6,7 +6,8 @@ use anyhow::{Result, ensure};
 use hilt::config::SimulateSettings;
 use hilt::plan::Plan;
 use hilt::sim::{Grain, Physics};
-use hilt::tasks::{FailureClass, Task};
+use hilt::task::built_in::of_the_paper;
+use hilt::tasks::FailureClass;
 
 /// Ten times the variance of the noise: what is just good enough elsewhere fails here.
 const MORE_NOISE: f64 = 10.0;
@@ -64,7 +65,7 @@ pub fn run(args: &Args) -> Result<()> {
     let chosen = |name: &str| args.variations.is_empty() || args.variations.iter().any(|v| v == name);
     let candidates: Vec<_> = candidates().into_iter().filter(|(name, _)| chosen(name)).collect();
     ensure!(!candidates.is_empty(), "--variations names no setting: the first column of the whole table does");
-    let planned = Task::ALL.map(|task| plans(task, count));
+    let planned = of_the_paper().map(|task| plans(&task, count));
     let few: Vec<&Plan> = planned.iter().flat_map(|plans| plans.iter().take(TIMED)).collect();
     let speeds = steps_per_s(&few, &candidates);
     println!(

@@ -10,16 +10,17 @@ use hilt::math::sin_cos;
 use hilt::plan::{Plan, Planner};
 use hilt::robot::Robot;
 use hilt::robot::file::built_in::paper_robot;
-use hilt::scene::{BLOCK_EDGE_M, Scene};
+use hilt::scene::Scene;
 use hilt::seed::stream;
 use hilt::sim::{Controller, Disturbance, Follower, Physics, World};
-use hilt::state::{CONTROL_DT_S, CONTROL_HZ, Context, Pose};
+use hilt::state::{CONTROL_DT_S, CONTROL_HZ, Pose};
+use hilt::task::built_in::{pick_up, stack};
 use hilt::tasks::{FailureClass, Monitor, Observation, Task, draw_scene};
 use nalgebra::{Point3, Vector3};
 use scripted::Script;
 use std::f64::consts::TAU;
 use std::fs;
-use std::sync::LazyLock;
+use std::sync::{Arc, LazyLock};
 use std::time::Instant;
 
 /// Joints of the Jaco, and of its arm.
@@ -34,12 +35,14 @@ const SWING_RAD_S: f64 = 0.5;
 const SWING_PERIOD_S: f64 = 2.0;
 /// The fingers go on closing \[rad/s\].
 const GRIP_RAD_S: f64 = 0.3;
+/// Edge of the block \[m\].
+const BLOCK_EDGE_M: f64 = 0.05;
 /// How deep under the table the ramming script wants the tool \[m\].
 const RAM_M: f64 = -0.15;
 
 /// `count` planned scenes of a task.
-pub fn plans(task: Task, count: u64) -> Vec<Plan> {
-    let mut planner = Planner::new(&paper_robot(), &PlanSettings::default());
+pub fn plans(task: &Arc<Task>, count: u64) -> Vec<Plan> {
+    let mut planner = Planner::new(&paper_robot(), task, &PlanSettings::default());
     let settings = SceneSettings::default();
     let scenes = (0..count)
         .map(|i| draw_scene(&paper_robot(), task, &settings, &mut stream(0, "scene", i)).expect("the default area has room"));
@@ -61,7 +64,7 @@ pub fn episode(plan: &Plan, physics: Physics, noise_variance: f64) -> End {
 
 /// The same scene by a script that looks less: what it loses, the physics let slip.
 pub fn scripted_episode(plan: &Plan, physics: Physics, noise_variance: f64) -> End {
-    run(plan, &mut Script::carry(&plan.scene.block, plan.scene.target_m()), physics, noise_variance)
+    run(plan, &mut Script::carry(&plan.scene.objects[0].pose, plan.scene.target_m(0)), physics, noise_variance)
 }
 
 fn run(plan: &Plan, controller: &mut dyn Controller, physics: Physics, noise_variance: f64) -> End {
@@ -72,7 +75,7 @@ fn run(plan: &Plan, controller: &mut dyn Controller, physics: Physics, noise_var
     let mut seen = world.observe();
     let mut steps = 0;
     while !monitor.update(&seen).success {
-        if steps == settings.max_steps as usize || seen.state.block.position_m[2] < 0.0 {
+        if steps == settings.max_steps as usize || seen.state.objects[0].position_m[2] < 0.0 {
             return End { failure: Some(monitor.classify(&seen)), steps };
         }
         world.step(&disturbance.apply(&controller.command(&seen)));
@@ -114,7 +117,7 @@ pub struct Errors {
 /// All scripted trials.
 pub fn errors(physics: Physics) -> Errors {
     let settings = SceneSettings { yaw: true, ..SceneSettings::default() };
-    let scene = |task, index| {
+    let scene = |task: &Arc<Task>, index| {
         draw_scene(&paper_robot(), task, &settings, &mut stream(7, "study", index)).expect("the default area has room")
     };
     let of = |trial: &dyn Fn(u64) -> f64| {
@@ -123,22 +126,22 @@ pub fn errors(physics: Physics) -> Errors {
         [all[all.len() / 2], all[all.len() - 1]]
     };
     Errors {
-        hold: of(&|i| slip(&scene(Task::PickUp, i), physics, 0.0)),
-        swing: of(&|i| slip(&scene(Task::PickUp, i), physics, SWING_RAD_S)),
-        drift: of(&|i| drift(scene(Task::Stack, i), physics)),
-        rammed: of(&|i| rammed(&scene(Task::PickUp, i), physics)),
-        tracking: of(&|i| tracking(scene(Task::PickUp, i), physics, i)),
+        hold: of(&|i| slip(&scene(&pick_up(), i), physics, 0.0)),
+        swing: of(&|i| slip(&scene(&pick_up(), i), physics, SWING_RAD_S)),
+        drift: of(&|i| drift(scene(&stack(), i), physics)),
+        rammed: of(&|i| rammed(&scene(&pick_up(), i), physics)),
+        tracking: of(&|i| tracking(scene(&pick_up(), i), physics, i)),
     }
 }
 
 /// The block's centre as the hand sees it.
 fn in_hand(arm: &Robot, seen: &Observation) -> Vector3<f64> {
-    arm.tool_pose(&seen.state.q).inverse_transform_point(&Point3::from(seen.state.block.position_m)).coords
+    arm.tool_pose(&seen.state.q).inverse_transform_point(&Point3::from(seen.state.objects[0].position_m)).coords
 }
 
 /// Slip of a lifted block while joint 1 swings with this amplitude \[rad/s\].
 fn slip(scene: &Scene, physics: Physics, swing_rad_s: f64) -> f64 {
-    let (arm, mut world, mut script) = (paper_robot(), World::with(scene, physics), Script::lift(&scene.block));
+    let (arm, mut world, mut script) = (paper_robot(), World::with(scene, physics), Script::lift(&scene.objects[0].pose));
     let mut rested = 0;
     while rested < FIVE_SECONDS / 2 {
         rested += usize::from(script.on_last_leg());
@@ -163,19 +166,18 @@ fn slip(scene: &Scene, physics: Physics, swing_rad_s: f64) -> f64 {
 
 /// A block set on the base block.
 fn drift(mut scene: Scene, physics: Physics) -> f64 {
-    let Context::Base(base) = scene.context else { return 0.0 };
-    let [x, y, z] = base.position_m;
-    scene.block = Pose { position_m: [x + 0.005, y - 0.005, z + BLOCK_EDGE_M], ..scene.block };
+    let [x, y, z] = scene.objects[1].pose.position_m;
+    scene.objects[0].pose = Pose { position_m: [x + 0.005, y - 0.005, z + BLOCK_EDGE_M], ..scene.objects[0].pose };
     let mut world = World::with(&scene, physics);
     for _ in 0..FIVE_SECONDS {
         world.step(&Joints::zeros(JOINTS));
     }
-    (Vector3::from(world.observe().state.block.position_m) - Vector3::from(scene.block.position_m)).norm()
+    (Vector3::from(world.observe().state.objects[0].position_m) - Vector3::from(scene.objects[0].pose.position_m)).norm()
 }
 
 /// Depth of a finger's lowest corner while the hand presses the fingers onto the table.
 fn rammed(scene: &Scene, physics: Physics) -> f64 {
-    let (mut world, mut script) = (World::with(scene, physics), Script::lift(&scene.block));
+    let (mut world, mut script) = (World::with(scene, physics), Script::lift(&scene.objects[0].pose));
     script.legs[1].tool_m[2] = RAM_M;
     let mut deepest: f64 = 0.0;
     for _ in 0..2 * FIVE_SECONDS {
@@ -189,7 +191,7 @@ fn rammed(scene: &Scene, physics: Physics) -> f64 {
 
 /// The arm under noise alone, the block out of its way.
 fn tracking(mut scene: Scene, physics: Physics, index: u64) -> f64 {
-    scene.block.position_m = [0.1, 0.7, BLOCK_EDGE_M / 2.0];
+    scene.objects[0].pose.position_m = [0.1, 0.7, BLOCK_EDGE_M / 2.0];
     let mut noise = Disturbance::new(&paper_robot(), &SimulateSettings::default(), stream(0, "tracking", index));
     let mut world = World::with(&scene, physics);
     let mut worst: f64 = 0.0;

@@ -184,7 +184,7 @@ mod tests {
         let dir = tempfile::tempdir().expect("temporary directory");
         let path = dir.path().join("episode-00007.mcap");
         std::fs::copy(fixture, &path).expect("copied");
-        let mut pipeline = Pipeline::defaults(crate::task::Task::PickUp);
+        let mut pipeline = Pipeline::defaults(&crate::task::built_in::pick_up());
         pipeline.convert.keep_failed = true;
         let found = |bytes: usize| find(&path, &pipeline, &Room(AtomicUsize::new(bytes))).expect("a recording").1;
         let (held, again) = (found(HELD_BYTES).expect("kept"), found(0).expect("kept"));

@@ -1,21 +1,13 @@
 //! From a preset or a pipeline file and `--set` words to a checked [`Pipeline`].
 
+use super::pipeline_file::{ROBOT, TASK, parsed, read_table};
 use super::ranges::Range;
 use super::robot::is_file;
 use super::{ChosenTask, Pipeline, Preset, check};
 use crate::error::{Error, Result};
-use crate::interrupt;
 use crate::words::shown;
-use std::fs::File;
-use std::io::Read;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
-/// A pipeline file with every key is 4 kB long; this leaves room for comments and boxes \[bytes\].
-const LONGEST_FILE: u64 = 1 << 20;
-/// The key outside of all sections that may be overridden.
-const ROBOT: &str = "robot";
-/// The key of the task.
-const TASK: &str = "task";
 /// Parts of a dotted key: stage, sections, key.
 const MOST_PARTS: usize = 4;
 
@@ -56,25 +48,6 @@ impl Pipeline {
     }
 }
 
-/// The table in a pipeline file. The files of a robot and of a task are named relative to the one that names them.
-pub(super) fn read_table(path: &Path) -> Result<toml::Table> {
-    let mut own = parsed(&read(path)?, &path.display().to_string())?;
-    for key in [ROBOT, TASK] {
-        let said = own.get(key).and_then(toml::Value::as_str).filter(|said| is_file(said));
-        if let Some(file) = said.map(|said| path.parent().unwrap_or(Path::new("")).join(said)) {
-            own.insert(key.into(), file.display().to_string().into());
-        }
-    }
-    Ok(own)
-}
-
-fn parsed(text: &str, origin: &str) -> Result<toml::Table> {
-    text.parse().map_err(|e: toml::de::Error| {
-        let why: Vec<String> = e.to_string().trim_end().lines().map(shown).collect();
-        Error::Usage(format!("{origin} is not valid TOML: {}", why.join("\n")))
-    })
-}
-
 /// The settings of the preset that a file `extends`, with the file's own over them. A preset may extend another.
 fn extended(mut own: toml::Table, origin: &str) -> Result<toml::Table> {
     let Some(name) = own.remove("extends") else {
@@ -104,20 +77,6 @@ fn lay_over(table: &mut toml::Table, own: toml::Table) {
             }
         }
     }
-}
-
-/// Whatever stands at `path`, a pipe too, is read up to a limit.
-fn read(path: &Path) -> Result<String> {
-    let io = |e| Error::io(path, "read", e);
-    let mut bytes = Vec::new();
-    let waits = interrupt::waiting();
-    File::open(path).map_err(io)?.take(LONGEST_FILE + 1).read_to_end(&mut bytes).map_err(io)?;
-    drop(waits);
-    let refuse = |why: String| Error::Usage(format!("{} is not a pipeline file: {why}", path.display()));
-    if bytes.len() as u64 > LONGEST_FILE {
-        return Err(refuse(format!("it is longer than {LONGEST_FILE} bytes")));
-    }
-    String::from_utf8(bytes).map_err(|_| refuse("it is not UTF-8 text".into()))
 }
 
 /// The name of the task that a table says.

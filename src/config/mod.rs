@@ -7,6 +7,7 @@ mod choices;
 mod data;
 mod limits;
 mod load;
+mod pipeline_file;
 mod ppo;
 mod preset;
 mod pretrain;

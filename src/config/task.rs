@@ -1,6 +1,6 @@
 //! Which task a pipeline is for.
 
-use super::load;
+use super::pipeline_file::read_table;
 use super::robot::is_file;
 use crate::task::{Task, built_in};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
@@ -21,7 +21,7 @@ impl ChosenTask {
         if !is_file(said) {
             return built_in::find(said).map(ChosenTask);
         }
-        let mut file = load::read_table(Path::new(said)).map_err(|why| why.to_string())?;
+        let mut file = read_table(Path::new(said)).map_err(|why| why.to_string())?;
         match file.remove("task") {
             Some(task @ toml::Value::Table(_)) => {
                 let task: Task = task.try_into().map_err(|why: toml::de::Error| format!("{said}: [task]: {}", why.message()))?;

@@ -157,15 +157,17 @@ mod tests {
     use super::*;
     use crate::scene::Obstacle;
     use crate::state::Action;
-    use crate::tasks::{Observation, Task};
+    use crate::task::built_in::{pick_up, stack};
+    use crate::tasks::Observation;
 
     #[test]
     fn selection_and_evaluation_share_no_episode() {
-        let mut pipeline = Pipeline::defaults(Task::Stack);
+        let mut pipeline = Pipeline::defaults(&stack());
         pipeline.train.select_episodes = 20;
         let (select, evaluate) = (Rollouts::selection(&pipeline, 3, 10), Rollouts::evaluation(&pipeline, 3, 10));
         assert_eq!((select.episodes, evaluate.episodes), (20, pipeline.evaluate.episodes));
-        let scenes = |of: &Rollouts| (0..20).map(|i| of.scene(i).expect("a scene").block.position_m).collect::<Vec<_>>();
+        let scenes =
+            |of: &Rollouts| (0..20).map(|i| of.scene(i).expect("a scene").objects[0].pose.position_m).collect::<Vec<_>>();
         let (selecting, evaluating) = (scenes(&select), scenes(&evaluate));
         assert!(selecting.iter().all(|scene| !evaluating.contains(scene)));
         let noise = |of: &Rollouts| of.stream("noise", 0).get_stream();
@@ -184,12 +186,12 @@ mod tests {
     /// The rollouts of a selection too: training goes on with a count of 0 instead of ending without its checkpoint.
     #[test]
     fn rollouts_that_break_down_or_ask_for_no_number_are_counted_by_their_class() {
-        let mut pipeline = Pipeline::defaults(Task::PickUp);
+        let mut pipeline = Pipeline::defaults(&pick_up());
         pipeline.train.select_episodes = 3;
         let classes = |pipeline: &Pipeline, command: f64| {
             let make = |_, _: &Scene| Ok(Some(Box::new(Constant(command)) as Box<dyn Controller>));
             let trials = Rollouts::selection(pipeline, 3, 10).run(make, &Interrupt::default(), |_| Ok(()));
-            Summary::of(Task::PickUp, &trials.expect("no error")).failures
+            Summary::of(&pick_up(), &trials.expect("no error")).failures
         };
         assert_eq!(classes(&pipeline, 0.0)["never_reached"], 3);
         assert_eq!(classes(&pipeline, f64::NAN)["command_not_finite"], 3);

@@ -72,20 +72,13 @@ impl Summary {
 mod tests {
     use super::*;
     use crate::robot::file::built_in::paper_robot;
-    use crate::scene::Scene;
-    use crate::state::{Context, Pose};
+    use crate::scene::{Placed, Scene};
+    use crate::state::Pose;
+    use crate::task::built_in::pick_up;
 
     fn trial(index: u64, failure: Option<FailureClass>, steps: u64) -> Trial {
-        let block = Pose::from_yaw([0.4, 0.0, 0.025], 0.0);
-        let scene = Scene {
-            robot: paper_robot(),
-            task: Task::PickUp,
-            block,
-            context: Context::None,
-            obstacles: vec![],
-            friction: 1.0,
-            block_mass_kg: 0.1,
-        };
+        let block = Placed { pose: Pose::from_yaw([0.4, 0.0, 0.025], 0.0), friction: 1.0, mass_kg: 0.1 };
+        let scene = Scene { robot: paper_robot(), task: pick_up(), objects: vec![block], goals: vec![], obstacles: vec![] };
         let conditions = vec![true, true, failure.is_none(), failure.is_none(), failure.is_none()];
         Trial { index, scene, success: failure.is_none(), failure, steps, reward: 0.0, conditions, hit_obstacle: false }
     }
@@ -94,7 +87,7 @@ mod tests {
     fn counts_add_up_and_json_has_the_promised_fields() {
         let trials: Vec<Trial> =
             (0..20).map(|i| trial(i, (i < 3).then_some(FailureClass::Dropped), if i < 3 { 400 } else { 80 + i })).collect();
-        let summary = Summary::of(Task::PickUp, &trials);
+        let summary = Summary::of(&pick_up(), &trials);
         assert_eq!((summary.episodes, summary.successes, summary.success_rate), (20, 17, 0.85));
         assert_eq!(summary.failures["dropped"], 3);
         assert_eq!(summary.failures.values().sum::<u64>() + summary.successes, summary.episodes);

@@ -112,7 +112,8 @@ mod tests {
     use crate::plan::Planner;
     use crate::robot::file::built_in::paper_robot;
     use crate::seed::stream;
-    use crate::tasks::{Task, draw_scene};
+    use crate::task::built_in::pick_up;
+    use crate::tasks::draw_scene;
 
     #[test]
     fn blocks_hold_all_episodes_once() {
@@ -125,9 +126,10 @@ mod tests {
     #[test]
     fn a_table_holds_a_block_exactly_and_another_block_is_refused() {
         let scenes = SceneSettings::default();
-        let mut planner = Planner::new(&paper_robot(), &PlanSettings::default());
+        let (robot, task) = (paper_robot(), pick_up());
+        let mut planner = Planner::new(&robot, &task, &PlanSettings::default());
         let mut plan = |index| {
-            let scene = draw_scene(&paper_robot(), Task::PickUp, &scenes, &mut stream(0, "scene", index)).expect("there is room");
+            let scene = draw_scene(&robot, &task, &scenes, &mut stream(0, "scene", index)).expect("there is room");
             planner.plan(index, &scene, &mut stream(0, "search", index)).map_err(|e| e.to_string())
         };
         let block = Block::all(3).next().expect("a block");
@@ -135,10 +137,10 @@ mod tests {
         let none: Planned = (0..3).map(|number| (number, Err(format!("episode {number}")))).collect();
         let all: Planned = (0..3).map(|number| (number, plan(number))).collect();
         for planned in [mixed, none, all] {
-            let table = block_to_table(&paper_robot(), planned.clone());
-            assert_eq!(block_from_table(&paper_robot(), block, table.clone()), Ok(planned));
+            let table = block_to_table(&robot, planned.clone());
+            assert_eq!(block_from_table((&robot, &task), block, table.clone()), Ok(planned));
             let other = Block::all(2).next().expect("a block");
-            assert!(block_from_table(&paper_robot(), other, table).expect_err("one more").contains("not 0 to 1"));
+            assert!(block_from_table((&robot, &task), other, table).expect_err("one more").contains("not 0 to 1"));
         }
     }
 }

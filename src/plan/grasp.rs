@@ -101,17 +101,19 @@ fn quarter_turn(yaw: f64) -> f64 {
 mod tests {
     use super::*;
     use crate::robot::file::built_in::{all, paper_robot};
+    use crate::task::built_in::pick_up;
 
     #[test]
     fn fingers_close_as_far_as_the_block_lets_them() {
+        let block = &pick_up().objects[0];
         // As measured: a cube of 5 cm stops them at .98 to 1.01 rad.
-        assert_eq!(closed_on_block(&paper_robot())[6], 0.98);
+        assert_eq!(closed_around(&paper_robot(), block)[6], 0.98);
         for robot in all() {
-            let closed = closed_on_block(&robot);
+            let closed = closed_around(&robot, block);
             for (i, joint) in robot.fingers().enumerate() {
                 let mut farther = closed;
                 farther[joint] += 0.02 * robot.joints[joint].per_radian() * robot.closing_way(i).signum();
-                let presses = |q: &Joints| presses_block(&robot, joint + 1, q);
+                let presses = |q: &Joints| presses(&robot, joint + 1, q, block);
                 assert!(!presses(&closed) && presses(&farther), "{}: {closed:?}", robot.name);
             }
         }

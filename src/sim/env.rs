@@ -124,9 +124,10 @@ mod tests {
     use crate::plan::Planner;
     use crate::scene::Obstacle;
     use crate::sim::{Controller, Follower};
+    use crate::task::built_in::pick_up;
 
     fn env(change: impl Fn(&mut Pipeline)) -> TaskEnv {
-        let mut pipeline = Pipeline::defaults(Task::PickUp);
+        let mut pipeline = Pipeline::defaults(&pick_up());
         change(&mut pipeline);
         TaskEnv::new(&pipeline, pipeline.train.ppo.reward, pipeline.train.ppo.horizon_steps, 11)
     }
@@ -162,8 +163,11 @@ mod tests {
         let mut env = env(|pipeline| pipeline.train.ppo.reward = reward);
         let mut seen = begin(&mut env, 0);
         let scene = env.running.as_ref().expect("begun").scene.clone();
-        let plan =
-            Planner::new(&scene.robot, &Pipeline::defaults(Task::PickUp).plan).plan(0, &scene, &mut stream(0, "env test", 0));
+        let plan = Planner::new(&scene.robot, &scene.task, &Pipeline::defaults(&pick_up()).plan).plan(
+            0,
+            &scene,
+            &mut stream(0, "env test", 0),
+        );
         let mut follower = Follower::new(&plan.expect("a plan")).expect("a follower");
         let mut sum = 0.0;
         loop {
@@ -183,7 +187,7 @@ mod tests {
         let (milestones, _) = demonstrated(RewardKind::Staged);
         assert!((milestones - 1.11).abs() < 1e-6, "{milestones}");
         let (_, last) = demonstrated(RewardKind::Dense);
-        let gamma = Pipeline::defaults(Task::PickUp).train.ppo.gamma;
+        let gamma = Pipeline::defaults(&pick_up()).train.ppo.gamma;
         assert!((last - 1.0 - 1.0 / (1.0 - gamma)).abs() < 1e-4, "{last}");
     }
 

@@ -94,6 +94,7 @@ mod tests {
     use crate::robot::file::built_in::paper_robot;
     use crate::scene::Obstacle;
     use crate::sim::World;
+    use crate::task::built_in::{pick_up, stack};
     use crate::tasks::{FailureClass, draw_scene};
 
     /// Joints of the paper's robot, and of its arm.
@@ -103,7 +104,7 @@ mod tests {
     #[test]
     fn commands_without_noise_lead_where_they_led_and_with_noise_elsewhere() {
         let settings = SceneSettings::default();
-        let scene = draw_scene(&paper_robot(), Task::Stack, &settings, &mut stream(3, "scene", 0)).expect("there is room");
+        let scene = draw_scene(&paper_robot(), &stack(), &settings, &mut stream(3, "scene", 0)).expect("there is room");
         let mut world = World::new(&scene);
         let mut states = world.observe().state.to_row();
         let actions: Vec<f32> =
@@ -112,13 +113,13 @@ mod tests {
             world.step(&action.iter().map(|v| f64::from(*v)).collect());
             states.extend(world.observe().state.to_row());
         }
-        let demo = Demo::new(&Task::Stack.layout(&paper_robot()), states, actions.clone(), actions).expect("lengths match");
+        let demo = Demo::new(&stack().layout(&paper_robot()), states, actions.clone(), actions).expect("lengths match");
         let again = |noise_variance: f64| {
             let off = PulseSettings { probability: 0.0, ..PulseSettings::default() };
             let noise = SimulateSettings { noise_variance, pulses: off, ..SimulateSettings::default() };
             let episode = reexecute(
                 0,
-                (&paper_robot(), Task::Stack, &demo),
+                (&paper_robot(), &stack(), &demo),
                 &settings,
                 &noise,
                 &FingerPulses::default(),
@@ -137,15 +138,15 @@ mod tests {
     fn a_demo_whose_execution_breaks_down_is_no_panic() {
         let touching = Obstacle { center_m: [0.0, 0.0, 0.3], size_m: [0.02; 3] };
         let settings = SceneSettings { obstacles: vec![touching], ..SceneSettings::default() };
-        let scene = draw_scene(&paper_robot(), Task::PickUp, &SceneSettings::default(), &mut stream(3, "scene", 0))
-            .expect("there is room");
+        let scene =
+            draw_scene(&paper_robot(), &pick_up(), &SceneSettings::default(), &mut stream(3, "scene", 0)).expect("there is room");
         let start = World::new(&scene).observe().state.to_row();
         const STEPS: usize = 100;
         let (states, still) = (start.repeat(STEPS + 1), vec![0.0; STEPS * DIM]);
-        let demo = Demo::new(&Task::PickUp.layout(&paper_robot()), states, still.clone(), still).expect("lengths match");
+        let demo = Demo::new(&pick_up().layout(&paper_robot()), states, still.clone(), still).expect("lengths match");
         let episode = reexecute(
             0,
-            (&paper_robot(), Task::PickUp, &demo),
+            (&paper_robot(), &pick_up(), &demo),
             &settings,
             &SimulateSettings::default(),
             &FingerPulses::default(),
@@ -158,17 +159,16 @@ mod tests {
     #[test]
     fn excited_fingers_get_other_commands_and_the_arm_the_demos() {
         let settings = SceneSettings::default();
-        let scene = draw_scene(&paper_robot(), Task::PickUp, &settings, &mut stream(3, "scene", 0)).expect("there is room");
+        let scene = draw_scene(&paper_robot(), &pick_up(), &settings, &mut stream(3, "scene", 0)).expect("there is room");
         const STEPS: usize = 60;
         let states = World::new(&scene).observe().state.to_row().repeat(STEPS + 1);
         let actions: Vec<f32> = (0..STEPS * DIM).map(|i| 0.01 * (i % DIM) as f32).collect();
-        let demo =
-            Demo::new(&Task::PickUp.layout(&paper_robot()), states, actions.clone(), actions.clone()).expect("lengths match");
+        let demo = Demo::new(&pick_up().layout(&paper_robot()), states, actions.clone(), actions.clone()).expect("lengths match");
         let executed = |fingers: &FingerPulses, index: u64| -> Vec<f32> {
             let noise = SimulateSettings { noise_variance: 0.0, ..SimulateSettings::default() };
             let episode = reexecute(
                 index,
-                (&paper_robot(), Task::PickUp, &demo),
+                (&paper_robot(), &pick_up(), &demo),
                 &settings,
                 &noise,
                 fingers,

@@ -1,10 +1,8 @@
 //! A kind of goal: what must hold, where the object goes, what is paid on the way. A goal that the vocabulary lacks is one file with this
-//! trait, a variant of [`Target`] and its words in `task/file.rs`.
+//! trait, a line in `kind.rs`, a variant of [`crate::task::Target`] and its words in `task/file.rs`.
 
 use super::Observation;
-use super::{inside, lift, on, place};
 use crate::scene::Scene;
-use crate::task::{Goal, Target};
 
 /// What is paid once for a milestone (paper 4.3).
 pub const PAID_REACHED: f64 = 0.01;
@@ -44,16 +42,4 @@ pub trait Kind {
 
     /// What is paid, each once: for lifting, and for the object where it belongs (`there`) or all conditions met (`done`).
     fn paid(&self, lifted: bool, there: bool, done: bool) -> [(bool, f64); 2];
-}
-
-impl Goal {
-    /// Its kind.
-    pub fn kind(&self) -> &dyn Kind {
-        match &self.target {
-            Target::Lift { .. } => &lift::Lift,
-            Target::At { .. } => &place::AtPlace,
-            Target::On(_) => &on::OnTop,
-            Target::In(_) => &inside::Inside,
-        }
-    }
 }

@@ -114,19 +114,20 @@ fn arm(robot: &Robot) -> Chain {
 mod tests {
     use super::*;
     use crate::robot::file::built_in::named;
+    use crate::task::built_in::{pick_and_place, pick_up, stack};
 
     #[test]
     fn a_layout_describes_the_rows_of_its_robot() {
         let panda = named("panda").expect("it is there").expect("it is sound");
         for (robot, joints) in [(&*paper_robot(), 9), (&panda, 9)] {
-            for (task, more) in [(Task::PickUp, 0), (Task::PickAndPlace, 3), (Task::Stack, 7)] {
+            for (task, more) in [(pick_up(), 0), (pick_and_place(), 3), (stack(), 7)] {
                 let layout = task.layout(robot);
                 assert_eq!(layout.check(), Ok(()));
                 let dims = (layout.state_dim(), layout.changing(), layout.action_dim());
                 assert_eq!(dims, (2 * joints + 7 + more, 2 * joints + 7, joints));
             }
         }
-        let layout = Task::Stack.layout(&panda);
+        let layout = stack().layout(&panda);
         let names = |at: usize| layout.state.iter().flat_map(|span| &span.entries).nth(at).cloned();
         assert_eq!(names(0).as_deref(), Some("panda_joint1.q_rad"));
         assert_eq!(names(8).as_deref(), Some("panda_finger_joint2.q_m"));

@@ -3,6 +3,7 @@
 
 mod goal;
 mod inside;
+mod kind;
 mod layout;
 mod lift;
 mod monitor;

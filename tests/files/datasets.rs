@@ -10,6 +10,7 @@ use hilt::data::inspect;
 use hilt::demo::{Demo, Episode};
 use hilt::interrupt::Interrupt;
 use hilt::robot::file::built_in::paper_robot;
+use hilt::task::built_in::{of_the_paper, pick_up, stack};
 use hilt::tasks::Task;
 use parquet::arrow::ArrowWriter;
 use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
@@ -18,7 +19,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use tempfile::{TempDir, tempdir};
 
-fn episodes(task: Task) -> Vec<Episode> {
+fn episodes(task: &Arc<Task>) -> Vec<Episode> {
     [(0, 5), (3, 1), (4, 12)].map(|(index, steps)| episode(task, index, steps)).into()
 }
 
@@ -26,7 +27,7 @@ fn demos(episodes: &[Episode]) -> Vec<Demo> {
     episodes.iter().map(|e| e.to_demo().expect("a demo")).collect()
 }
 
-fn write(root: &Path, task: Task) -> Vec<Demo> {
+fn write(root: &Path, task: &Arc<Task>) -> Vec<Demo> {
     let episodes = episodes(task);
     let demos = demos(&episodes);
     let rows: Vec<DatasetEpisode> = episodes.iter().zip(&demos).map(|(e, d)| DatasetEpisode::of(e, d.clone())).collect();
@@ -34,7 +35,7 @@ fn write(root: &Path, task: Task) -> Vec<Demo> {
     demos
 }
 
-fn written(task: Task) -> (TempDir, PathBuf) {
+fn written(task: &Arc<Task>) -> (TempDir, PathBuf) {
     let dir = tempdir().expect("dir");
     let root = dir.path().join("train");
     write(&root, task);
@@ -47,18 +48,18 @@ fn refusal(root: &Path) -> String {
 
 #[test]
 fn datasets_round_trip_exactly_with_the_last_state() {
-    for task in Task::ALL {
+    for task in of_the_paper() {
         let dir = tempdir().expect("dir");
         let (here, there) = (dir.path().join("train"), dir.path().join("elsewhere/train"));
-        let demos = write(&here, task);
-        write(&there, task);
+        let demos = write(&here, &task);
+        write(&there, &task);
         assert_eq!(contents(&here), contents(&there));
         let Dataset { demos: found, rewards, successes, source_episodes, fps, provenance: origin, .. } =
-            dataset::read_for(&here, task.name()).expect("readable");
+            dataset::read_for(&here, &task.name).expect("readable");
         assert_eq!(found, demos);
         assert_eq!((source_episodes, successes, fps), (vec![0, 3, 4], vec![true; 3], 20));
         assert_eq!(rewards[0], [0.0, 0.0, 0.1, 0.0, 0.0], "the reward of state 3 belongs to action 2");
-        assert_eq!(origin, provenance("convert", task));
+        assert_eq!(origin, provenance("convert", &task));
         let told = inspect(&here, &Interrupt::default()).expect("a dataset");
         assert_eq!((&told["kind"], &told["frames"]), (&"dataset".into(), &18.into()));
     }
@@ -66,7 +67,7 @@ fn datasets_round_trip_exactly_with_the_last_state() {
 
 #[test]
 fn damage_to_any_file_is_refused() {
-    let (_dir, root) = written(Task::Stack);
+    let (_dir, root) = written(&stack());
     for name in ["meta/info.json", "meta/stats.json", "meta/tasks.parquet"] {
         refuses_damage(&root.join(name), || dataset::read(&root));
     }
@@ -78,12 +79,12 @@ fn damage_to_any_file_is_refused() {
 #[test]
 fn missing_files_are_named() {
     for name in ["meta/stats.json", "meta/tasks.parquet", "data/chunk-000/file-000.parquet"] {
-        let (_dir, root) = written(Task::PickUp);
+        let (_dir, root) = written(&pick_up());
         fs::remove_file(root.join(name)).expect("removed");
         let message = refusal(&root);
         assert!(message.contains(name) && message.contains("is missing"), "{message}");
     }
-    let (dir, root) = written(Task::PickUp);
+    let (dir, root) = written(&pick_up());
     let message = refusal(dir.path());
     assert!(message.contains("holds the two datasets train and validation"), "{message}");
     fs::remove_file(root.join("meta/info.json")).expect("removed");
@@ -102,7 +103,7 @@ fn edits_of_info_are_named_for_what_they_are() {
         ("\"total_frames\": 18", "\"total_frames\": 19", "does not match its seal"),
     ];
     for (old, new, expected) in cases {
-        let (_dir, root) = written(Task::PickUp);
+        let (_dir, root) = written(&pick_up());
         let path = root.join("meta/info.json");
         let text = fs::read_to_string(&path).expect("text");
         assert!(text.contains(old), "{old}");
@@ -114,7 +115,7 @@ fn edits_of_info_are_named_for_what_they_are() {
 
 #[test]
 fn a_dataset_of_another_task_is_refused() {
-    let (_dir, root) = written(Task::PickUp);
+    let (_dir, root) = written(&pick_up());
     let message = dataset::read_for(&root, "stack").unwrap_err().to_string();
     assert!(message.contains("pick-up (states of 25 numbers), not of stack (32)"), "{message}");
 }
@@ -152,7 +153,7 @@ fn what_another_program_put_into_the_data_is_named() {
         ("action", 0.25, "was rewritten by another program"),
     ];
     for (column, value, expected) in cases {
-        let (_dir, root) = written(Task::PickUp);
+        let (_dir, root) = written(&pick_up());
         rewrite(&root, column, 7, 2, value);
         let message = refusal(&root);
         assert!(message.contains(expected), "{message}");
@@ -161,23 +162,23 @@ fn what_another_program_put_into_the_data_is_named() {
 
 #[test]
 fn nothing_is_written_without_episodes_or_over_foreign_files() {
-    let (_dir, root) = written(Task::PickUp);
+    let (_dir, root) = written(&pick_up());
     let before = contents(&root);
-    let origin = provenance("convert", Task::PickUp);
-    let message = dataset::write(&root, (&paper_robot(), Task::PickUp), &[].as_slice().into(), &origin).unwrap_err().to_string();
+    let origin = provenance("convert", &pick_up());
+    let message = dataset::write(&root, (&paper_robot(), &pick_up()), &[].as_slice().into(), &origin).unwrap_err().to_string();
     assert!(message.contains("at least one episode"), "{message}");
     assert_eq!(contents(&root), before);
-    let (stack, home) = (episodes(Task::Stack), root.join("data"));
-    let demos = demos(&stack);
-    let rows: Vec<DatasetEpisode> = stack.iter().zip(&demos).map(|(e, d)| DatasetEpisode::of(e, d.clone())).collect();
+    let (others, home) = (episodes(&stack()), root.join("data"));
+    let demos = demos(&others);
+    let rows: Vec<DatasetEpisode> = others.iter().zip(&demos).map(|(e, d)| DatasetEpisode::of(e, d.clone())).collect();
     assert!(
-        dataset::write(&root, (&paper_robot(), Task::PickUp), &rows.as_slice().into(), &origin)
+        dataset::write(&root, (&paper_robot(), &pick_up()), &rows.as_slice().into(), &origin)
             .unwrap_err()
             .to_string()
             .contains("is of stack")
     );
     assert!(
-        dataset::write(&home, (&paper_robot(), Task::Stack), &rows.as_slice().into(), &origin)
+        dataset::write(&home, (&paper_robot(), &stack()), &rows.as_slice().into(), &origin)
             .unwrap_err()
             .to_string()
             .contains("chunk-000")

@@ -1,12 +1,12 @@
 //! Made-up episodes, tables and weights with awkward numbers: what files must keep exactly.
 
 use hilt::data::Provenance;
-use hilt::demo::{Contacts, Episode, Phase, Step};
+use hilt::demo::{Body, Contacts, Episode, Phase, Step, Touch};
 use hilt::joints::Joints;
 use hilt::robot::file::built_in::paper_robot;
-use hilt::scene::{Obstacle, Scene};
+use hilt::scene::{Obstacle, Placed, Scene};
 use hilt::seed::stream;
-use hilt::state::{Context, Pose, State};
+use hilt::state::{Pose, State};
 use hilt::table::{Table, Values};
 use hilt::tasks::{FailureClass, Task};
 use hilt::tensor::NamedTensor;
@@ -16,6 +16,7 @@ use serde_json::json;
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 /// A file's bytes, or those of all files below a directory.
 pub fn contents(path: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
@@ -30,32 +31,25 @@ pub fn contents(path: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
 }
 
 /// A provenance with nested settings.
-pub fn provenance(stage: &str, task: Task) -> Provenance {
-    let mut made = Provenance::new(stage, task.name(), json!({ "noise_variance": 0.001, "pulses": { "steps": 4 } }), 7);
+pub fn provenance(stage: &str, task: &Task) -> Provenance {
+    let mut made = Provenance::new(stage, &task.name, json!({ "noise_variance": 0.001, "pulses": { "steps": 4 } }), 7);
     made.inputs.insert("plans.parquet".into(), "ab".repeat(32));
     made
 }
 
 /// An episode of `steps` steps, the same for the same arguments.
-pub fn episode(task: Task, index: u64, steps: usize) -> Episode {
+pub fn episode(task: &Arc<Task>, index: u64, steps: usize) -> Episode {
     let mut rng = stream(index, "files test", steps as u64);
-    let base = pose(&mut rng);
-    let context = match task {
-        Task::PickUp => Context::None,
-        Task::PickAndPlace => Context::Goal([0.5, -0.1, 0.025]),
-        Task::Stack => Context::Base(base),
-    };
+    let placed = |_| Placed { pose: pose(&mut rng), friction: 1.0, mass_kg: 0.1 };
     let scene = Scene {
         robot: paper_robot(),
-        task,
-        block: pose(&mut rng),
-        context,
+        task: Arc::clone(task),
+        objects: task.objects.iter().map(placed).collect(),
+        goals: vec![[0.5, -0.1, 0.025]; task.goal_names().len()],
         obstacles: vec![Obstacle { center_m: [0.4, 0.1, 0.1], size_m: [0.02, 0.3, 0.2] }; index as usize % 2],
-        friction: 1.0,
-        block_mass_kg: 0.1,
     };
-    let steps: Vec<Step> = (0..steps).map(|t| step(task, context, t, &mut rng)).collect();
-    let mut last = step(task, context, 0, &mut rng);
+    let steps: Vec<Step> = (0..steps).map(|t| step(&scene, t, &mut rng)).collect();
+    let mut last = step(&scene, 0, &mut rng);
     last.commanded = Joints::zeros(9);
     last.executed = Joints::zeros(9);
     last.phase = None;
@@ -63,19 +57,26 @@ pub fn episode(task: Task, index: u64, steps: usize) -> Episode {
     Episode { index, scene, steps, last, success, failure: (!success).then_some(FailureClass::Dropped) }
 }
 
-fn step(task: Task, context: Context, t: usize, rng: &mut ChaCha8Rng) -> Step {
+fn step(scene: &Scene, t: usize, rng: &mut ChaCha8Rng) -> Step {
+    let objects = scene.objects.len();
+    let seen: Vec<Pose> = (0..objects).map(|_| pose(rng)).collect();
     let mut commanded = numbers(rng);
     commanded[3] = -0.0;
-    let finger_block_n = [rng.random(), 0.0, f64::MIN_POSITIVE].into();
+    // Each object touches the one before it.
+    let mut touch = |i: usize| Touch {
+        fingers_n: [rng.random(), 0.0, f64::MIN_POSITIVE].into(),
+        table: rng.random(),
+        objects: i.checked_sub(1).into_iter().collect(),
+    };
+    let touches = (0..objects).map(&mut touch).collect();
     Step {
-        state: State { q: numbers(rng), dq: numbers(rng), block: pose(rng), context },
-        base_now: (task == Task::Stack).then(|| pose(rng)),
+        state: State { q: numbers(rng), dq: numbers(rng), objects: seen, goals: scene.goals.clone() },
+        objects: (0..objects).map(|_| Body { pose: pose(rng), speed_m_s: rng.random() }).collect(),
         commanded,
         executed: numbers(rng),
-        contacts: Contacts { finger_block_n, block_table: rng.random(), robot_table: rng.random(), ..Contacts::none(3) },
-        block_speed_m_s: rng.random(),
+        contacts: Contacts { objects: touches, robot_obstacle: rng.random(), robot_table: rng.random() },
         reward: if t == 3 { 0.1 } else { 0.0 },
-        conditions: task.condition_names().iter().map(|_| rng.random()).collect(),
+        conditions: scene.task.condition_names().iter().map(|_| rng.random()).collect(),
         phase: Some(Phase::ALL[t % Phase::ALL.len()]),
     }
 }

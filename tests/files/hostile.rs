@@ -5,7 +5,7 @@ use hilt::data::{Provenance, inspect, inspect_text, json_file, recording, seal, 
 use hilt::error::Result;
 use hilt::interrupt::Interrupt;
 use hilt::learn::{Dynamics, Policy};
-use hilt::tasks::Task;
+use hilt::task::built_in::pick_up;
 use hilt::tasks::with_layout;
 use serde_json::{Value, json};
 use std::fs;
@@ -31,7 +31,7 @@ fn with_header(whole: &[u8], change: impl Fn(&str) -> String) -> Vec<u8> {
 #[test]
 fn weights_are_refused_from_their_header_before_they_take_memory() {
     let path = Path::new("policy.safetensors");
-    let whole = weights::encode(path, "policy", &tensors(), &json!({}), &provenance("train", Task::PickUp)).expect("encoded");
+    let whole = weights::encode(path, "policy", &tensors(), &json!({}), &provenance("train", &pick_up())).expect("encoded");
     let says = |bytes: &[u8]| refusal(|| weights::decode(path, bytes));
     assert!(weights::decode(path, &with_header(&whole, str::to_string)).is_ok());
     let long = [&u64::MAX.to_le_bytes()[..], &whole[8..]].concat();
@@ -78,17 +78,17 @@ fn a_foreign_or_missing_file_is_named_from_its_head() {
 }
 
 fn encoded_weights() -> Vec<u8> {
-    let made = provenance("train", Task::PickUp);
+    let made = provenance("train", &pick_up());
     weights::encode(Path::new("w"), "policy", &tensors(), &json!({}), &made).expect("encoded")
 }
 
 #[test]
 fn inspect_knows_an_artefact_by_its_content_and_not_by_its_ending() {
     let dir = tempdir().expect("dir");
-    let (task, origin) = (Task::PickUp, provenance("simulate", Task::PickUp));
+    let (task, origin) = (pick_up(), provenance("simulate", &pick_up()));
     let at = |name: &str| dir.path().join(name);
     fs::write(at("model.pt"), encoded_weights()).expect("written");
-    recording::write(&at("episode"), &episode(task, 0, 3), &origin).expect("written");
+    recording::write(&at("episode"), &episode(&task, 0, 3), &origin).expect("written");
     table_file::write(&at("log.csv"), &table(3), &origin).expect("written");
     json_file::write(&at("result.safetensors"), &json!({}), &origin).expect("written");
     let kinds = [("model.pt", "weights"), ("episode", "recording"), ("log.csv", "table"), ("result.safetensors", "summary")];
@@ -103,10 +103,10 @@ fn inspect_knows_an_artefact_by_its_content_and_not_by_its_ending() {
 #[test]
 fn inspect_says_that_recordings_are_of_several_origins() {
     let dir = tempdir().expect("dir");
-    let task = Task::PickUp;
-    let origin = provenance("simulate", task);
+    let task = pick_up();
+    let origin = provenance("simulate", &task);
     let write = |index: u64, origin: &Provenance| {
-        recording::write(&dir.path().join(recording::file_name(index)), &episode(task, index, 4), origin).expect("written");
+        recording::write(&dir.path().join(recording::file_name(index)), &episode(&task, index, 4), origin).expect("written");
     };
     let found = || inspect(dir.path(), &Interrupt::default()).expect("recordings");
     (0..3).for_each(|index| write(index, &origin));

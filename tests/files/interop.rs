@@ -5,7 +5,7 @@ use hilt::data::dataset::{self, DatasetEpisode};
 use hilt::data::{json_file, recording, table_file, weights};
 use hilt::interrupt::Interrupt;
 use hilt::robot::file::built_in::paper_robot;
-use hilt::tasks::Task;
+use hilt::task::built_in::of_the_paper;
 use serde_json::json;
 use std::path::PathBuf;
 
@@ -14,10 +14,10 @@ use std::path::PathBuf;
 #[ignore = "writes files for other programs"]
 fn write_a_run() {
     let runs = PathBuf::from(std::env::var_os("HILT_INTEROP_DIR").expect("HILT_INTEROP_DIR names a directory"));
-    for task in Task::ALL {
-        let dir = runs.join(task.name());
-        let origin = |stage| provenance(stage, task);
-        let episodes: Vec<_> = (0..12).map(|i| episode(task, i, 20 + i as usize)).collect();
+    for task in of_the_paper() {
+        let dir = runs.join(&task.name);
+        let origin = |stage| provenance(stage, &task);
+        let episodes: Vec<_> = (0..12).map(|i| episode(&task, i, 20 + i as usize)).collect();
         for e in &episodes {
             let path = dir.join("recordings").join(recording::file_name(e.index));
             recording::write(&path, e, &origin("simulate")).expect("written");
@@ -28,7 +28,7 @@ fn write_a_run() {
         let (train, validation) = (pick(&train), pick(&validation));
         dataset::write_split(
             &dir.join("dataset"),
-            (&paper_robot(), task),
+            (&paper_robot(), &task),
             &train.as_slice().into(),
             &validation.as_slice().into(),
             &origin("convert"),
@@ -42,7 +42,7 @@ fn write_a_run() {
         for name in ["plans.parquet", "policy.training.parquet", "evaluation.episodes.parquet"] {
             table_file::write(&dir.join(name), &table(100), &origin("plan")).expect("written");
         }
-        json_file::write(&dir.join("evaluation.json"), &json!({ "task": task, "episodes": 0 }), &origin("evaluate"))
+        json_file::write(&dir.join("evaluation.json"), &json!({ "task": task.name, "episodes": 0 }), &origin("evaluate"))
             .expect("written");
     }
 }

@@ -3,7 +3,7 @@
 use crate::fixtures::{provenance, table};
 use hilt::data::table_file;
 use hilt::error::Error;
-use hilt::tasks::Task;
+use hilt::task::built_in::stack;
 use std::fs;
 use std::path::PathBuf;
 use std::process::Command;
@@ -16,7 +16,7 @@ const PLACE: &str = "HILT_TEST_LIMITED_DIR";
 fn a_full_disk_is_an_error_and_keeps_the_old_file() {
     let dir = tempdir().expect("dir");
     let path = dir.path().join("metrics.parquet");
-    table_file::write(&path, &table(10), &provenance("train", Task::Stack)).expect("written");
+    table_file::write(&path, &table(10), &provenance("train", &stack())).expect("written");
     let before = fs::read(&path).expect("bytes");
     let this = std::env::current_exe().expect("this test");
     // 16 blocks of 512 or 1024 bytes; without the trap the signal would end the process.
@@ -32,7 +32,7 @@ fn a_full_disk_is_an_error_and_keeps_the_old_file() {
 #[ignore = "the child of the test above"]
 fn the_child() {
     let dir = PathBuf::from(std::env::var_os(PLACE).expect("started by the test above"));
-    match table_file::write(&dir.join("metrics.parquet"), &table(20_000), &provenance("train", Task::Stack)) {
+    match table_file::write(&dir.join("metrics.parquet"), &table(20_000), &provenance("train", &stack())) {
         Err(Error::Io { action: "write", .. }) => println!("refused as it should"),
         other => panic!("{other:?}"),
     }

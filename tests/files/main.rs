@@ -13,7 +13,7 @@ use hilt::error::{Error, Result};
 use hilt::interrupt::Interrupt;
 use hilt::robot::file::built_in::paper_robot;
 use hilt::table::{Table, Values};
-use hilt::tasks::Task;
+use hilt::task::built_in::{of_the_paper, pick_and_place, pick_up, stack};
 use serde_json::json;
 use std::fs;
 use std::path::Path;
@@ -52,8 +52,8 @@ pub fn refuses_damage<T>(path: &Path, read: impl Fn() -> Result<T>) {
 #[test]
 fn recordings_round_trip_exactly_and_are_the_same_bytes_anywhere() {
     let (here, there) = (tempdir().expect("dir"), tempdir().expect("dir"));
-    for (task, index) in Task::ALL.into_iter().zip(4..) {
-        let (made, origin) = (episode(task, index, 30), provenance("simulate", task));
+    for (task, index) in of_the_paper().into_iter().zip(4..) {
+        let (made, origin) = (episode(&task, index, 30), provenance("simulate", &task));
         let name = recording::file_name(index);
         recording::write(&here.path().join(&name), &made, &origin).expect("written");
         recording::write(&there.path().join(&name), &made, &origin).expect("written");
@@ -70,7 +70,7 @@ fn recordings_round_trip_exactly_and_are_the_same_bytes_anywhere() {
 fn damaged_recordings_are_refused() {
     let dir = tempdir().expect("dir");
     let path = dir.path().join("episode-00001.mcap");
-    recording::write(&path, &episode(Task::Stack, 1, 12), &provenance("simulate", Task::Stack)).expect("written");
+    recording::write(&path, &episode(&stack(), 1, 12), &provenance("simulate", &stack())).expect("written");
     refuses_damage(&path, || recording::read(&path));
 }
 
@@ -87,7 +87,7 @@ fn a_foreign_mcap_file_is_refused() {
 #[test]
 fn tables_round_trip_with_nan_and_damage_is_refused() {
     let dir = tempdir().expect("dir");
-    let origin = provenance("plan", Task::PickUp);
+    let origin = provenance("plan", &pick_up());
     for rows in [0, 1, 3000] {
         let (made, path) = (table(rows), dir.path().join(format!("{rows}.parquet")));
         table_file::write(&path, &made, &origin).expect("written");
@@ -126,7 +126,7 @@ fn rows(tables: &[Table]) -> Vec<Vec<String>> {
 #[test]
 fn a_table_that_is_written_and_read_in_pieces_is_the_same_table_and_damage_is_refused() {
     let dir = tempdir().expect("dir");
-    let (path, origin) = (dir.path().join("groups.parquet"), provenance("plan", Task::PickUp));
+    let (path, origin) = (dir.path().join("groups.parquet"), provenance("plan", &pick_up()));
     let groups = [9000, 1, 20].map(table);
     table_file::write_groups(&path, groups.iter().cloned().map(Ok), &origin).expect("written");
     let bytes = fs::read(&path).expect("bytes");
@@ -155,7 +155,7 @@ fn a_table_that_is_written_and_read_in_pieces_is_the_same_table_and_damage_is_re
 fn weights_round_trip_in_order_and_damage_is_refused() {
     let dir = tempdir().expect("dir");
     let path = dir.path().join("policy.safetensors");
-    let (made, meta, origin) = (tensors(), json!({ "mean": [0.5, 1e-7], "hidden": 32 }), provenance("train", Task::PickUp));
+    let (made, meta, origin) = (tensors(), json!({ "mean": [0.5, 1e-7], "hidden": 32 }), provenance("train", &pick_up()));
     weights::write(&path, "policy", &made, &meta, &origin).expect("written");
     let bytes = fs::read(&path).expect("bytes");
     weights::write(&path, "policy", &made, &meta, &origin).expect("written again");
@@ -170,7 +170,7 @@ fn weights_round_trip_in_order_and_damage_is_refused() {
 fn weights_that_are_not_finite_are_refused_and_the_old_file_stays() {
     let dir = tempdir().expect("dir");
     let path = dir.path().join("policy.safetensors");
-    let (mut made, origin) = (tensors(), provenance("train", Task::PickUp));
+    let (mut made, origin) = (tensors(), provenance("train", &pick_up()));
     weights::write(&path, "policy", &made, &json!({}), &origin).expect("written");
     let before = contents(&path);
     made[1].data[5] = f32::NAN;
@@ -191,7 +191,7 @@ fn summaries_round_trip_and_damage_is_refused() {
     let dir = tempdir().expect("dir");
     let path = dir.path().join("evaluation.json");
     let (content, origin) =
-        (json!({ "task": "stack", "wilson_95": [0.9, 0.95], "episodes": 500 }), provenance("evaluate", Task::Stack));
+        (json!({ "task": "stack", "wilson_95": [0.9, 0.95], "episodes": 500 }), provenance("evaluate", &stack()));
     json_file::write(&path, &content, &origin).expect("written");
     assert_eq!(json_file::read(&path).expect("readable"), (content, origin));
     refuses_damage(&path, || json_file::read(&path));
@@ -200,12 +200,12 @@ fn summaries_round_trip_and_damage_is_refused() {
 #[test]
 fn another_schema_version_is_named_whoever_wrote_it() {
     let dir = tempdir().expect("dir");
-    let task = Task::PickUp;
-    let mut newer = provenance("simulate", task);
+    let task = pick_up();
+    let mut newer = provenance("simulate", &task);
     newer.schema_version = 2;
     let at = |name: &str| dir.path().join(name);
     let write_all = |origin: &hilt::data::Provenance| {
-        recording::write(&at("a.mcap"), &episode(task, 0, 3), origin).expect("written");
+        recording::write(&at("a.mcap"), &episode(&task, 0, 3), origin).expect("written");
         table_file::write(&at("a.parquet"), &table(3), origin).expect("written");
         weights::write(&at("a.safetensors"), "policy", &tensors(), &json!({}), origin).expect("written");
         json_file::write(&at("a.json"), &json!({}), origin).expect("written");
@@ -216,7 +216,7 @@ fn another_schema_version_is_named_whoever_wrote_it() {
         let message = inspect(&at(name), &Interrupt::default()).unwrap_err().to_string();
         assert!(message.contains("schema version 2, this hilt reads version 1"), "{message}");
     }
-    write_all(&provenance("simulate", task));
+    write_all(&provenance("simulate", &task));
     for name in names {
         // The same, by an editor of bytes.
         let mut bytes = fs::read(at(name)).expect("bytes");
@@ -241,12 +241,12 @@ fn a_missing_file_is_an_error_of_the_system() {
 #[test]
 fn inspect_knows_every_kind() {
     let dir = tempdir().expect("dir");
-    let task = Task::PickAndPlace;
-    let origin = provenance("simulate", task);
+    let task = pick_and_place();
+    let origin = provenance("simulate", &task);
     let at = |name: &str| dir.path().join(name);
     for index in 0..3 {
         let path = at("recordings").join(recording::file_name(index));
-        recording::write(&path, &episode(task, index, 9), &origin).expect("written");
+        recording::write(&path, &episode(&task, index, 9), &origin).expect("written");
     }
     table_file::write(&at("t.parquet"), &table(50), &origin).expect("written");
     weights::write(&at("w.safetensors"), "dynamics", &tensors(), &json!({ "hidden": 32 }), &origin).expect("written");

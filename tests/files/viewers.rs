@@ -2,9 +2,10 @@
 
 use crate::fixtures::{episode, provenance};
 use foxglove::messages::{FrameTransforms, JointStates, SceneUpdate};
-use hilt::data::recording::{self, BASE_FRAME, BLOCK_FRAME, ROBOT_NAME, URDF_NAME, WORLD_FRAME};
+use hilt::data::recording::{self, ROBOT_NAME, TASK_NAME, URDF_NAME, WORLD_FRAME, frame_of};
 use hilt::robot::{Robot, urdf};
 use hilt::state::CONTROL_HZ;
+use hilt::task::built_in::stack;
 use hilt::tasks::Task;
 use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion};
 use prost::Message;
@@ -27,8 +28,8 @@ fn world_from(frame: &str, transforms: &FrameTransforms) -> Isometry3<f64> {
 fn transforms_add_up_to_the_kinematics_at_simulated_times() {
     let dir = tempdir().expect("dir");
     let path = dir.path().join("episode.mcap");
-    let made = episode(Task::Stack, 1, 8);
-    recording::write(&path, &made, &provenance("simulate", Task::Stack)).expect("written");
+    let made = episode(&stack(), 1, 8);
+    recording::write(&path, &made, &provenance("simulate", &stack())).expect("written");
     let bytes = fs::read(&path).expect("bytes");
     let moments: Vec<_> = made.steps.iter().chain([&made.last]).collect();
     let mut seen: BTreeMap<String, usize> = BTreeMap::new();
@@ -45,9 +46,10 @@ fn transforms_add_up_to_the_kinematics_at_simulated_times() {
                     let error = world_from(name, &transforms).inverse() * pose;
                     assert!(error.translation.vector.norm() < 1e-9 && error.rotation.angle() < 1e-7, "{name} at {t}");
                 }
-                let block = world_from(BLOCK_FRAME, &transforms).translation.vector;
-                assert_eq!(<[f64; 3]>::from(block), moments[*t].state.block.position_m);
-                world_from(BASE_FRAME, &transforms);
+                for (name, now) in ["block", "base"].into_iter().zip(&moments[*t].objects) {
+                    let at = world_from(&frame_of(name), &transforms).translation.vector;
+                    assert_eq!(<[f64; 3]>::from(at), now.pose.position_m);
+                }
             }
             "/joint_states" => {
                 let joints = JointStates::decode(&message.data[..]).expect("joints").joints;
@@ -57,7 +59,7 @@ fn transforms_add_up_to_the_kinematics_at_simulated_times() {
             "/scene" => {
                 let entities = SceneUpdate::decode(&message.data[..]).expect("scene").entities;
                 let ids: Vec<&str> = entities.iter().map(|e| e.id.as_str()).collect();
-                assert_eq!(ids, ["table", "block", "base_block", "obstacles"]);
+                assert_eq!(ids, ["table", "block", "base", "obstacles"]);
             }
             _ => {}
         }
@@ -67,8 +69,10 @@ fn transforms_add_up_to_the_kinematics_at_simulated_times() {
     assert_eq!(counts, [9, 9, 1, 9]);
     let summary = mcap::Summary::read(&bytes).expect("summary").expect("a finished file");
     let attached = |i: usize| mcap::read::attachment(&bytes, &summary.attachment_indexes[i]).expect("attachment");
-    let (first, second) = (attached(0), attached(1));
+    let (first, second, third) = (attached(0), attached(1), attached(2));
     assert_eq!((first.name.as_str(), &first.data[..]), (URDF_NAME, urdf(&made.scene.robot).as_bytes()));
     let robot: Robot = serde_json::from_slice(&second.data).expect("a robot");
     assert_eq!((second.name.as_str(), &robot), (ROBOT_NAME, &*made.scene.robot));
+    let task: Task = serde_json::from_slice(&third.data).expect("a task");
+    assert_eq!((third.name.as_str(), &task), (TASK_NAME, &*made.scene.task));
 }

@@ -59,8 +59,8 @@ def recording(path, task):
     frames = outcome.steps + 1
     expected = {"/tf": frames, "/joint_states": frames, "/scene": 1, "/hilt/scene": 1, "/hilt/step": frames, "/hilt/outcome": 1}
     check(counts == expected, f"{path}: messages {counts}, expected {expected}")
-    check(attachments == ["robot.urdf"], f"{path}: attachments {attachments}")
-    check({"j2n6s300_link_base", "j2n6s300_link_6", "block"} <= links, f"{path}: frames {links}")
+    check(attachments == ["robot.urdf", "robot.json", "task.json"], f"{path}: attachments {attachments}")
+    check({"j2n6s300_link_base", "j2n6s300_link_6", "object/block"} <= links, f"{path}: frames {links}")
     check_provenance(metadata["hilt"]["provenance"], task, path)
     return outcome.episode, steps, outcome.success
 

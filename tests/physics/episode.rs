@@ -8,11 +8,11 @@ use hilt::error::Error;
 use hilt::interrupt::Interrupt;
 use hilt::joints::Joints;
 use hilt::robot::file::built_in::paper_robot;
-use hilt::scene::{Obstacle, Scene};
+use hilt::scene::{Obstacle, Placed, Scene};
 use hilt::sim::{Controller, Disturbance, run_episode};
-use hilt::state::Action;
-use hilt::state::Pose;
-use hilt::tasks::{FailureClass, Observation, Task};
+use hilt::state::{Action, Pose};
+use hilt::task::built_in::{of_the_paper, pick_up};
+use hilt::tasks::{FailureClass, Observation};
 
 /// No command of the Jaco.
 fn still() -> Action {
@@ -40,14 +40,12 @@ fn run(scene: &Scene, controller: &mut dyn Controller, index: u64, max_steps: u3
 /// The figure of merit of the scripted grasp under noise; the bound leaves room for the script, which is no planner.
 #[test]
 fn noisy_episodes_of_all_tasks_succeed() {
-    for task in Task::ALL {
+    for task in of_the_paper() {
         let count = 20;
         let solved = (0..count).filter(|i| {
-            let scene = scene(task, *i);
-            let mut script = match task {
-                Task::PickUp => Script::lift(&scene.block),
-                _ => Script::carry(&scene.block, scene.target_m()),
-            };
+            let scene = scene(&task, *i);
+            let block = &scene.objects[0].pose;
+            let mut script = if task == pick_up() { Script::lift(block) } else { Script::carry(block, scene.target_m(0)) };
             run(&scene, &mut script, *i, 400).success
         });
         let solved = solved.count();
@@ -57,8 +55,8 @@ fn noisy_episodes_of_all_tasks_succeed() {
 
 #[test]
 fn a_successful_episode_is_recorded_whole() {
-    let scene = scene(Task::PickUp, 0);
-    let episode = run(&scene, &mut Script::lift(&scene.block), 0, 400);
+    let scene = scene(&pick_up(), 0);
+    let episode = run(&scene, &mut Script::lift(&scene.objects[0].pose), 0, 400);
     assert!(episode.success && episode.failure.is_none());
     let total: f64 = episode.steps.iter().chain([&episode.last]).map(|s| s.reward).sum();
     assert!((total - 1.11).abs() < 1e-12, "milestones of pick-up add up to {total}");
@@ -70,7 +68,7 @@ fn a_successful_episode_is_recorded_whole() {
 #[test]
 fn noise_is_on_the_executed_action_only() {
     let command = Joints::from_fn(9, |i| if i < 6 { f64::from(0.01 * i as f32) } else { 0.0 });
-    let episode = run(&scene(Task::PickUp, 0), &mut Constant(command), 0, 400);
+    let episode = run(&scene(&pick_up(), 0), &mut Constant(command), 0, 400);
     let mut sum = still();
     let mut squares = still();
     for step in &episode.steps {
@@ -122,10 +120,10 @@ fn pulses_come_at_their_rate_last_their_time_and_move_the_arm_only() {
 
 #[test]
 fn an_idle_arm_never_reaches_and_a_fallen_block_ends_the_episode() {
-    let mut scene = scene(Task::PickUp, 0);
+    let mut scene = scene(&pick_up(), 0);
     let idle = run(&scene, &mut Constant(still()), 0, 50);
     assert_eq!((idle.steps.len(), idle.success, idle.failure), (50, false, Some(FailureClass::NeverReached)));
-    scene.block.position_m = [3.0, 0.0, 0.5];
+    scene.objects[0].pose.position_m = [3.0, 0.0, 0.5];
     let fallen = run(&scene, &mut Constant(still()), 0, 200);
     assert!(fallen.steps.len() < 20, "a block that falls past the table ends the episode, not {} steps", fallen.steps.len());
 }
@@ -139,7 +137,7 @@ fn a_command_that_is_no_number_ends_the_episode_unrecorded() {
             if self.0 > 5 { [f64::NAN; 9].into() } else { still() }
         }
     }
-    let episode = run(&scene(Task::PickUp, 0), &mut Breaks(0), 0, 50);
+    let episode = run(&scene(&pick_up(), 0), &mut Breaks(0), 0, 50);
     assert_eq!(episode.steps.len(), 5);
     assert!(!episode.success);
     episode.to_demo().expect("only finite numbers are recorded");
@@ -149,19 +147,21 @@ fn a_command_that_is_no_number_ends_the_episode_unrecorded() {
 /// numbers that are none.
 #[test]
 fn an_episode_whose_simulation_breaks_down_is_a_failure_of_its_own_class_and_no_panic() {
-    let plain = scene(Task::PickUp, 0);
+    let plain = scene(&pick_up(), 0);
     let touching = Obstacle { center_m: [0.0, 0.0, 0.3], size_m: [0.02; 3] };
+    let block = plain.objects[0];
+    let with = |block: Placed| Scene { objects: vec![block], ..plain.clone() };
     let harmed = [
         Scene { obstacles: vec![touching], ..plain.clone() },
-        Scene { block_mass_kg: 1e-21, ..plain.clone() },
-        Scene { block: Pose { position_m: [1e300, 0.0, 0.025], ..plain.block }, ..plain.clone() },
-        Scene { block: Pose { quaternion_xyzw: [0.0; 4], ..plain.block }, ..plain.clone() },
+        with(Placed { mass_kg: 1e-21, ..block }),
+        with(Placed { pose: Pose { position_m: [1e300, 0.0, 0.025], ..block.pose }, ..block }),
+        with(Placed { pose: Pose { quaternion_xyzw: [0.0; 4], ..block.pose }, ..block }),
         Scene { obstacles: vec![Obstacle { center_m: [1e39; 3], size_m: [1e300; 3] }], ..plain.clone() },
-        Scene { friction: f64::NAN, block_mass_kg: f64::INFINITY, ..plain.clone() },
-        Scene { block_mass_kg: -1.0, ..plain },
+        with(Placed { friction: f64::NAN, mass_kg: f64::INFINITY, ..block }),
+        with(Placed { mass_kg: -1.0, ..block }),
     ];
     for (number, scene) in harmed.iter().enumerate() {
-        let episode = run(scene, &mut Script::lift(&scene.block), 0, 100);
+        let episode = run(scene, &mut Script::lift(&scene.objects[0].pose), 0, 100);
         let finite = episode.steps.iter().all(|s| s.state.to_row().iter().all(|v| v.is_finite()));
         assert!(!episode.success && finite && episode.steps.len() <= 100, "scene {number}");
         if number == 0 {
@@ -173,7 +173,7 @@ fn an_episode_whose_simulation_breaks_down_is_a_failure_of_its_own_class_and_no_
 
 #[test]
 fn a_command_that_is_no_number_is_a_failure_of_its_own_class() {
-    let scene = scene(Task::PickUp, 0);
+    let scene = scene(&pick_up(), 0);
     for bad in [f64::NAN, f64::INFINITY, 1e300] {
         let episode = run(&scene, &mut Constant(Joints::from_fn(9, |i| if i == 3 { bad } else { 0.0 })), 0, 50);
         assert_eq!((episode.failure, episode.steps.len()), (Some(FailureClass::CommandNotFinite), 0), "{bad}");
@@ -182,7 +182,7 @@ fn a_command_that_is_no_number_is_a_failure_of_its_own_class() {
 
 #[test]
 fn an_interrupt_ends_an_episode_within_a_step() {
-    let (scene, interrupt) = (scene(Task::PickUp, 0), Interrupt::default());
+    let (scene, interrupt) = (scene(&pick_up(), 0), Interrupt::default());
     interrupt.raise(2);
     let mut noise = disturbance(&SimulateSettings::default(), 0);
     let ended = run_episode(0, &scene, &mut Constant(still()), &mut noise, 10_000, &interrupt);

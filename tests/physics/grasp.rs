@@ -7,8 +7,7 @@ use hilt::math::sin_cos;
 use hilt::robot::Robot;
 use hilt::robot::file::built_in::all;
 use hilt::sim::{Controller, World};
-use hilt::state::Context;
-use hilt::tasks::Task;
+use hilt::task::built_in::{pick_and_place, pick_up, stack};
 use std::f64::consts::TAU;
 use std::sync::Arc;
 
@@ -24,10 +23,10 @@ const SWING_STEPS: f64 = 40.0;
 const WEIGHT_N: f64 = 0.981;
 
 fn lifted_height(robot: &Arc<Robot>, index: u64, friction: f64) -> f64 {
-    let mut scene = scene_of(robot, Task::PickUp, index);
-    scene.friction = friction;
+    let mut scene = scene_of(robot, &pick_up(), index);
+    scene.objects[0].friction = friction;
     let mut world = World::new(&scene);
-    play(&mut world, &mut Script::lift(&scene.block), 60).state.block.position_m[2]
+    play(&mut world, &mut Script::lift(&scene.objects[0].pose), 60).state.objects[0].position_m[2]
 }
 
 #[test]
@@ -42,9 +41,9 @@ fn friction_and_nothing_else_lifts_the_block() {
 
 /// How far the block moves in the hand while the arm's first joint swings with this amplitude for five seconds \[m\].
 fn slip(robot: &Arc<Robot>, index: u64, swing_rad_s: f64) -> f64 {
-    let scene = scene_of(robot, Task::PickUp, index);
+    let scene = scene_of(robot, &pick_up(), index);
     let mut world = World::new(&scene);
-    let mut script = Script::lift(&scene.block);
+    let mut script = Script::lift(&scene.objects[0].pose);
     let before = in_hand(&play(&mut world, &mut script, 40));
     for t in 0..FIVE_SECONDS {
         let seen = world.observe();
@@ -81,22 +80,24 @@ fn a_swinging_arm_keeps_what_it_holds() {
 
 #[test]
 fn a_placed_block_rests_and_a_stacked_block_stays() {
-    for (robot, task) in all().flat_map(|robot| [Task::PickAndPlace, Task::Stack].map(|task| (Arc::clone(&robot), task))) {
+    for (robot, task) in all().flat_map(|robot| [pick_and_place(), stack()].map(|task| (Arc::clone(&robot), task))) {
         for index in 0..POSITIONS {
-            let scene = scene_of(&robot, task, index);
+            let scene = scene_of(&robot, &task, index);
             let mut world = World::new(&scene);
-            let mut script = Script::carry(&scene.block, scene.target_m());
+            let mut script = Script::carry(&scene.objects[0].pose, scene.target_m(0));
             let then = play(&mut world, &mut script, 20);
-            let error = (nalgebra::Vector3::from(then.state.block.position_m) - nalgebra::Vector3::from(scene.target_m())).norm();
+            let error =
+                (nalgebra::Vector3::from(then.state.objects[0].position_m) - nalgebra::Vector3::from(scene.target_m(0))).norm();
             let name = &robot.name;
             assert!(error < 0.015, "{name}, {task} {index}: placed {error} m from the target");
-            assert!(then.released(), "{name}, {task} {index}: not released");
-            assert_eq!(then.contacts.block_base, task == Task::Stack, "{name}, {task} {index}: contact with the base block");
-            assert_eq!(then.contacts.block_table, task == Task::PickAndPlace, "{name}, {task} {index}: contact with the table");
+            assert!(then.released(0), "{name}, {task} {index}: not released");
+            let touch = &then.contacts.objects[0];
+            assert_eq!(touch.objects.contains(&1), task == stack(), "{name}, {task} {index}: contact with the base block");
+            assert_eq!(touch.table, task == pick_and_place(), "{name}, {task} {index}: contact with the table");
             for _ in 0..TWO_SECONDS {
                 world.step(&Joints::zeros(robot.joints.len()));
             }
-            let moved = distance(&then.state.block, &world.observe().state.block);
+            let moved = distance(&then.state.objects[0], &world.observe().state.objects[0]);
             assert!(moved < 1e-4, "{name}, {task} {index}: moved {moved} m in 2 s");
         }
     }
@@ -104,24 +105,24 @@ fn a_placed_block_rests_and_a_stacked_block_stays() {
 
 #[test]
 fn contact_forces_tell_a_grasp_and_a_release() {
-    let scene = scene(Task::PickAndPlace, 0);
+    let scene = scene(&pick_and_place(), 0);
     let mut world = World::new(&scene);
-    let mut script = Script::carry(&scene.block, scene.target_m());
+    let mut script = Script::carry(&scene.objects[0].pose, scene.target_m(0));
     let mut carried = 0;
     for _ in 0..400 {
         let seen = world.observe();
-        let [thumb, left, right] = seen.contacts.finger_block_n[..] else { panic!("three fingers") };
+        let [thumb, left, right] = seen.contacts.objects[0].fingers_n[..] else { panic!("three fingers") };
         match script.at {
-            0 => assert!(seen.released() && !seen.gripped() && seen.contacts.block_table, "before the grasp"),
-            3 | 4 if seen.state.block.position_m[2] > 0.035 => {
+            0 => assert!(seen.released(0) && !seen.gripped(0) && seen.contacts.objects[0].table, "before the grasp"),
+            3 | 4 if seen.state.objects[0].position_m[2] > 0.035 => {
                 carried += 1;
-                assert!(seen.gripped() && !seen.released() && !seen.contacts.block_table, "carrying: {:?}", seen.contacts);
+                assert!(seen.gripped(0) && !seen.released(0) && !seen.contacts.objects[0].table, "carrying: {:?}", seen.contacts);
                 // Finger 1 is the thumb: it alone presses against the other two.
                 assert!((thumb - left - right).abs() < 0.25 * thumb, "thumb {thumb} N against {left} N and {right} N");
                 assert!(thumb > 5.0 * WEIGHT_N, "a grip of {thumb} N");
             }
             7 if seen.tool_m[2] > 0.1 => {
-                assert!(seen.released() && !seen.gripped() && seen.contacts.block_table, "after the release");
+                assert!(seen.released(0) && !seen.gripped(0) && seen.contacts.objects[0].table, "after the release");
             }
             _ => {}
         }
@@ -132,17 +133,18 @@ fn contact_forces_tell_a_grasp_and_a_release() {
 
 #[test]
 fn a_resting_block_stands_where_the_scene_has_it() {
-    let scene = scene(Task::Stack, 0);
-    let Context::Base(base) = scene.context else { panic!("a stack scene has a base block") };
+    let scene = scene(&stack(), 0);
+    let base = scene.objects[1].pose;
     let mut world = World::new(&scene);
     let first = world.observe();
-    assert!(first.contacts.block_table && !first.contacts.block_base && !first.contacts.robot_table);
+    let touch = &first.contacts.objects[0];
+    assert!(touch.table && touch.objects.is_empty() && !first.contacts.robot_table);
     for _ in 0..TWO_SECONDS {
         world.step(&[0.0; 9].into());
     }
     let last = world.observe();
-    assert!(distance(&scene.block, &last.state.block) < 1e-4, "the block moved by itself");
-    assert!(distance(&base, &last.base_now.expect("stack has a base block")) < 1e-4, "the base block moved by itself");
-    assert!(lowest_corner(&last.state.block).abs() < 1e-4);
-    assert!(last.contacts.block_table && last.block_speed_m_s < 1e-3);
+    assert!(distance(&scene.objects[0].pose, &last.state.objects[0]) < 1e-4, "the block moved by itself");
+    assert!(distance(&base, &last.objects[1].pose) < 1e-4, "the base block moved by itself");
+    assert!(lowest_corner(&last.state.objects[0]).abs() < 1e-4);
+    assert!(last.contacts.objects[0].table && last.objects[0].speed_m_s < 1e-3);
 }

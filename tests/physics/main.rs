@@ -9,7 +9,7 @@ mod scripted;
 use hilt::config::SceneSettings;
 use hilt::robot::Robot;
 use hilt::robot::file::built_in::paper_robot;
-use hilt::scene::{BLOCK_EDGE_M, Scene};
+use hilt::scene::Scene;
 use hilt::sim::{Controller, World};
 use hilt::state::Pose;
 use hilt::tasks::{Observation, Task, draw_scene};
@@ -17,13 +17,16 @@ use nalgebra::{Isometry3, Point3};
 use scripted::Script;
 use std::sync::Arc;
 
+/// Half of the block's edges \[m\].
+const HALF_M: [f64; 3] = [0.025; 3];
+
 /// The scene of random position (and yaw) number `index`, with the paper's robot.
-fn scene(task: Task, index: u64) -> Scene {
+fn scene(task: &Arc<Task>, index: u64) -> Scene {
     scene_of(&paper_robot(), task, index)
 }
 
 /// The same with another.
-fn scene_of(robot: &Arc<Robot>, task: Task, index: u64) -> Scene {
+fn scene_of(robot: &Arc<Robot>, task: &Arc<Task>, index: u64) -> Scene {
     let settings = SceneSettings { yaw: true, ..SceneSettings::default() };
     draw_scene(robot, task, &settings, &mut hilt::seed::stream(7, "physics test", index))
         .expect("the default spawn area has room")
@@ -50,7 +53,7 @@ fn distance(a: &Pose, b: &Pose) -> f64 {
 
 /// Height of the lowest corner of a cube \[m\].
 fn lowest_corner(block: &Pose) -> f64 {
-    lowest_of_box(&block.isometry(), [0.0; 3], [BLOCK_EDGE_M / 2.0; 3])
+    lowest_of_box(&block.isometry(), [0.0; 3], HALF_M)
 }
 
 /// Height of the lowest point of the robot above its shoulder's link \[m\].
@@ -68,5 +71,5 @@ fn lowest_of_box(pose: &Isometry3<f64>, center: [f64; 3], half: [f64; 3]) -> f64
 /// The block as the hand sees it.
 fn in_hand(seen: &Observation) -> Pose {
     let hand = seen.robot.tool_pose(&seen.state.q);
-    Pose::from_isometry(&(hand.inverse() * seen.state.block.isometry()))
+    Pose::from_isometry(&(hand.inverse() * seen.state.objects[0].isometry()))
 }

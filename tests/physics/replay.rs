@@ -6,21 +6,23 @@ use hilt::config::SimulateSettings;
 use hilt::interrupt::Interrupt;
 use hilt::sim::{Controller, Disturbance, World, run_episode};
 use hilt::state::State;
+use hilt::task::built_in::{pick_and_place, pick_up, stack};
 use hilt::tasks::Task;
+use std::sync::Arc;
 
 /// Control steps until the scripted block is in the air.
 const MID_CARRY: usize = 105;
 
 /// The world in the middle of a carry, and its script.
-fn mid_carry(task: Task, index: u64) -> (World, Script) {
+fn mid_carry(task: &Arc<Task>, index: u64) -> (World, Script) {
     let scene = scene(task, index);
     let mut world = World::new(&scene);
-    let mut script = Script::carry(&scene.block, scene.target_m());
+    let mut script = Script::carry(&scene.objects[0].pose, scene.target_m(0));
     for _ in 0..MID_CARRY {
         let seen = world.observe();
         world.step(&script.command(&seen));
     }
-    assert!(world.observe().gripped(), "the block is in the hand");
+    assert!(world.observe().gripped(0), "the block is in the hand");
     (world, script)
 }
 
@@ -30,7 +32,7 @@ fn future(world: &mut World, script: &mut Script, steps: usize) -> Vec<u32> {
     for _ in 0..steps {
         let seen = world.observe();
         bits.extend(seen.state.to_row().iter().map(|v| v.to_bits()));
-        bits.extend(seen.contacts.finger_block_n.iter().map(|f| (*f as f32).to_bits()));
+        bits.extend(seen.contacts.objects[0].fingers_n.iter().map(|f| (*f as f32).to_bits()));
         world.step(&script.command(&seen));
     }
     bits
@@ -39,8 +41,8 @@ fn future(world: &mut World, script: &mut Script, steps: usize) -> Vec<u32> {
 #[test]
 fn an_episode_repeats_bit_for_bit_on_any_thread() {
     let run = || {
-        let scene = scene(Task::Stack, 3);
-        let mut script = Script::carry(&scene.block, scene.target_m());
+        let scene = scene(&stack(), 3);
+        let mut script = Script::carry(&scene.objects[0].pose, scene.target_m(0));
         let mut noise = Disturbance::new(&scene.robot, &SimulateSettings::default(), hilt::seed::stream(0, "simulate", 3));
         run_episode(3, &scene, &mut script, &mut noise, 300, &Interrupt::default()).expect("not interrupted")
     };
@@ -52,8 +54,8 @@ fn an_episode_repeats_bit_for_bit_on_any_thread() {
 
 #[test]
 fn recorded_actions_reproduce_the_recorded_states() {
-    let scene = scene(Task::PickUp, 4);
-    let mut script = Script::lift(&scene.block);
+    let scene = scene(&pick_up(), 4);
+    let mut script = Script::lift(&scene.objects[0].pose);
     let mut noise = Disturbance::new(&scene.robot, &SimulateSettings::default(), hilt::seed::stream(0, "simulate", 4));
     let episode = run_episode(4, &scene, &mut script, &mut noise, 200, &Interrupt::default()).expect("not interrupted");
     let demo = episode.to_demo().expect("a sound episode");
@@ -68,7 +70,7 @@ fn recorded_actions_reproduce_the_recorded_states() {
 #[test]
 fn a_snapshot_continues_bit_for_bit() {
     for index in 0..3 {
-        let (mut world, mut script) = mid_carry(Task::Stack, index);
+        let (mut world, mut script) = mid_carry(&stack(), index);
         let bytes = world.snapshot();
         let mut restored = World::restore(&bytes).expect("a snapshot");
         let mut twin = script.clone();
@@ -79,7 +81,7 @@ fn a_snapshot_continues_bit_for_bit() {
 
 #[test]
 fn a_world_can_move_to_another_thread() {
-    let (mut world, mut script) = mid_carry(Task::PickAndPlace, 0);
+    let (mut world, mut script) = mid_carry(&pick_and_place(), 0);
     let mut restored = World::restore(&world.snapshot()).expect("a snapshot");
     let mut twin = script.clone();
     let there = std::thread::spawn(move || future(&mut restored, &mut twin, 40)).join().expect("the thread ran");
@@ -88,26 +90,26 @@ fn a_world_can_move_to_another_thread() {
 
 #[test]
 fn bytes_that_are_no_snapshot_are_refused() {
-    let bytes = World::new(&scene(Task::PickUp, 0)).snapshot();
+    let bytes = World::new(&scene(&pick_up(), 0)).snapshot();
     let message = World::restore(&bytes[..bytes.len() / 2]).map(|_| ()).unwrap_err().to_string();
     assert!(message.contains("no snapshot"), "{message}");
 }
 
 #[test]
 fn a_recorded_state_can_be_set_exactly() {
-    for (task, index) in [(Task::PickUp, 0), (Task::PickAndPlace, 1), (Task::Stack, 2)] {
-        let (mut world, mut script) = if task == Task::PickUp {
-            let scene = scene(task, index);
+    for (task, index) in [(pick_up(), 0), (pick_and_place(), 1), (stack(), 2)] {
+        let (mut world, mut script) = if task == pick_up() {
+            let scene = scene(&task, index);
             let mut world = World::new(&scene);
-            let mut script = Script::lift(&scene.block);
+            let mut script = Script::lift(&scene.objects[0].pose);
             play(&mut world, &mut script, 1);
             (world, script)
         } else {
-            mid_carry(task, index)
+            mid_carry(&task, index)
         };
         let row = world.observe().state.to_row();
-        let recorded = State::from_row(task, 9, &row).expect("a row of this task");
-        let mut set = World::new(&scene(task, index));
+        let recorded = State::from_row(&task, 9, &row).expect("a row of this task");
+        let mut set = World::new(&scene(&task, index));
         set.set_state(&recorded);
         let seen = set.observe().state;
         let error = seen.to_row().iter().zip(&row).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
@@ -118,8 +120,8 @@ fn a_recorded_state_can_be_set_exactly() {
             world.step(&script.command(&a));
             set.step(&twin.command(&b));
         }
-        let apart = distance(&world.observe().state.block, &set.observe().state.block);
+        let apart = distance(&world.observe().state.objects[0], &set.observe().state.objects[0]);
         assert!(apart < 3e-3, "{task}: block {apart} m away from the recorded future after 1 s");
-        assert!(set.observe().gripped(), "{task}: dropped after setting the state");
+        assert!(set.observe().gripped(0), "{task}: dropped after setting the state");
     }
 }

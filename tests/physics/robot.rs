@@ -9,7 +9,8 @@ use hilt::robot::file::built_in::paper_robot;
 use hilt::scene::{Obstacle, Scene};
 use hilt::sim::{Controller, Disturbance, World};
 use hilt::state::{Action, CONTROL_DT_S};
-use hilt::tasks::{Observation, Task};
+use hilt::task::built_in::{pick_up, stack};
+use hilt::tasks::Observation;
 use rand::RngExt;
 use std::f64::consts::PI;
 
@@ -33,8 +34,8 @@ fn step(world: &mut World, action: &Action) -> Observation {
 
 /// A scene whose block is out of the arm's way.
 fn empty() -> Scene {
-    let mut scene = scene(Task::PickUp, 0);
-    scene.block.position_m = [0.1, 0.7, 0.025];
+    let mut scene = scene(&pick_up(), 0);
+    scene.objects[0].pose.position_m = [0.1, 0.7, 0.025];
     scene
 }
 
@@ -104,14 +105,14 @@ fn joints_stop_at_their_limits() {
 
 #[test]
 fn a_stalled_finger_pushes_no_harder_than_its_torque_allows() {
-    let scene = scene(Task::PickUp, 1);
+    let scene = scene(&pick_up(), 1);
     let mut world = World::new(&scene);
-    play(&mut world, &mut Script::lift(&scene.block), 20);
+    play(&mut world, &mut Script::lift(&scene.objects[0].pose), 20);
     let squeeze = |rad_s: f64| {
         let mut world = World::restore(&world.snapshot()).expect("a snapshot");
         let action = Joints::from_fn(JOINTS, |i| if i < ARM_JOINTS { 0.0 } else { rad_s });
         (0..20).for_each(|_| world.step(&action));
-        world.observe().contacts.finger_block_n[0]
+        world.observe().contacts.objects[0].fingers_n[0]
     };
     let (soft, hard) = (squeeze(0.1), squeeze(1.0));
     assert!((soft - hard).abs() < 0.05 * hard, "the force follows the commanded speed: {soft} N, {hard} N");
@@ -121,9 +122,9 @@ fn a_stalled_finger_pushes_no_harder_than_its_torque_allows() {
 
 #[test]
 fn ramming_the_block_into_the_table_breaks_nothing() {
-    let scene = scene(Task::PickUp, 2);
+    let scene = scene(&pick_up(), 2);
     let mut world = World::new(&scene);
-    let mut script = Script::lift(&scene.block);
+    let mut script = Script::lift(&scene.objects[0].pose);
     script.legs[0].tool_m[2] = 0.12;
     script.legs[1].tool_m[2] = -0.15;
     let mut deepest: f64 = 0.0;
@@ -131,7 +132,7 @@ fn ramming_the_block_into_the_table_breaks_nothing() {
     for _ in 0..160 {
         let seen = world.observe();
         touched |= seen.contacts.robot_table;
-        deepest = deepest.min(lowest_corner(&seen.state.block)).min(lowest_of_robot(&world.link_poses()));
+        deepest = deepest.min(lowest_corner(&seen.state.objects[0])).min(lowest_of_robot(&world.link_poses()));
         assert!(seen.state.q.iter().chain(&seen.state.dq).all(|v| v.is_finite()));
         world.step(&script.command(&seen));
     }
@@ -143,7 +144,7 @@ fn ramming_the_block_into_the_table_breaks_nothing() {
 fn random_actions_break_nothing() {
     for seed in 0..4 {
         let mut rng = hilt::seed::stream(seed, "abuse", 0);
-        let (mut world, limits) = (World::new(&scene(Task::Stack, seed)), velocities());
+        let (mut world, limits) = (World::new(&scene(&stack(), seed)), velocities());
         let mut action = Joints::zeros(JOINTS);
         let (mut deepest, mut overshoot): (f64, f64) = (0.0, 0.0);
         for t in 0..300 {
@@ -151,8 +152,8 @@ fn random_actions_break_nothing() {
                 action = Joints::from_fn(JOINTS, |i| limits[i] * (2.0 * rng.random::<f64>() - 1.0));
             }
             let seen = step(&mut world, &action);
-            assert!(seen.state.q.iter().chain(&seen.state.block.to_array()).all(|v| v.is_finite()));
-            deepest = deepest.min(lowest_corner(&seen.state.block)).min(lowest_of_robot(&world.link_poses()));
+            assert!(seen.state.q.iter().chain(&seen.state.objects[0].to_array()).all(|v| v.is_finite()));
+            deepest = deepest.min(lowest_corner(&seen.state.objects[0])).min(lowest_of_robot(&world.link_poses()));
             for (q, joint) in seen.state.q.iter().zip(&paper_robot().joints) {
                 let [low, high] = joint.limits;
                 overshoot = overshoot.max(low - q).max(q - high);

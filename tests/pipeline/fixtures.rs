@@ -5,7 +5,7 @@ use hilt::data::dataset::{self, Dataset, DatasetEpisode};
 use hilt::data::{recording, table_file, weights};
 use hilt::robot::file::built_in::paper_robot;
 use hilt::table::Values;
-use hilt::tasks::Task;
+use hilt::task::built_in::find;
 use hilt::tensor::NamedTensor;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -50,7 +50,7 @@ fn every_format_is_written_as_it_was() {
             success: successes[i],
         })
         .collect();
-    dataset::write(&to, (&paper_robot(), task.parse().expect("a task")), &rows.as_slice().into(), &provenance).expect("written");
+    dataset::write(&to, (&paper_robot(), &find(&task).expect("a task")), &rows.as_slice().into(), &provenance).expect("written");
 
     let (from, to) = at("policy.safetensors");
     let (tensors, meta, origin) = weights::read(&from, "policy").expect("weights");
@@ -66,7 +66,7 @@ fn files_of_the_version_before_are_of_the_papers_robot() {
     let (episode, _) = recording::read(&older.join("episode-00000.mcap")).expect("a recording");
     let found = dataset::read(&older.join("dataset")).expect("a dataset");
     assert_eq!(episode.scene.robot, paper_robot());
-    let task: Task = found.task.parse().expect("a task");
+    let task = find(&found.task).expect("a task");
     assert_eq!(found.layout, task.layout(&paper_robot()));
     let demo = episode.to_demo().expect("a demo");
     assert_eq!((found.demos[0].states(), found.demos[0].layout()), (demo.states(), demo.layout()));

@@ -4,6 +4,7 @@ use crate::runs::{HILT, Run, contents, text};
 use hilt::data::{recording, table_file};
 use hilt::plan::{from_table, to_table};
 use hilt::robot::file::built_in::paper_robot;
+use hilt::task::built_in::pick_up;
 use std::fs;
 use std::os::unix::fs::symlink;
 use std::path::Path;
@@ -90,7 +91,7 @@ fn simulation_stops() {
     let run = Run::finished();
     let path = run.at("plans.parquet");
     let (table, origin) = table_file::read(&path).expect("plans");
-    let plan = from_table(&paper_robot(), &table).expect("plans").swap_remove(0);
+    let plan = from_table(&paper_robot(), &pick_up(), &table).expect("plans").swap_remove(0);
     let plans: Vec<_> = (0..1000).map(|index| hilt::plan::Plan { index, ..plan.clone() }).collect();
     table_file::write(&path, &to_table(&paper_robot(), &plans), &origin).expect("written");
     interrupted_by("INT", &run, run.words("simulate"), SOON);

@@ -5,14 +5,15 @@ use hilt::joints::Joints;
 use hilt::plan::{Plan, RESOLUTION_M};
 use hilt::robot::Robot;
 use hilt::robot::model::Shape;
-use hilt::scene::{BLOCK_EDGE_M, Scene};
-use hilt::state::Context;
+use hilt::scene::Scene;
 use nalgebra::Isometry3;
 use rapier3d::math::{Pose, Vector};
 use rapier3d::parry::query;
 use rapier3d::parry::shape::{Capsule, Cuboid, SharedShape};
 use std::sync::Arc;
 
+/// Half of the block's edges \[m\].
+const HALF_M: [f64; 3] = [0.025; 3];
 /// Single precision of the oracle \[m\].
 const PRECISION_M: f64 = 5e-4;
 /// The support may be touched this near to grasp and release: sideways, upward \[m\].
@@ -35,10 +36,7 @@ impl Oracle {
         Oracle {
             robot: Arc::clone(&scene.robot),
             obstacles: scene.obstacles.iter().map(|o| (place(o.center_m), cuboid(o.size_m.map(|s| s / 2.0)))).collect(),
-            base: match scene.context {
-                Context::Base(base) => Some((pose(&base.isometry()), cuboid([BLOCK_EDGE_M / 2.0; 3]))),
-                _ => None,
-            },
+            base: scene.objects.get(1).map(|base| (pose(&base.pose.isometry()), cuboid(HALF_M))),
             table: (place([0.0, 0.0, -0.5]), cuboid([2.0, 2.0, 0.5])),
         }
     }
@@ -46,7 +44,7 @@ impl Oracle {
     /// Panics where the arm or the carried block comes nearer than `clearance_m` to anything, between samples too.
     pub fn check(&self, plan: &Plan, clearance_m: f64) {
         let grasp = plan.waypoints.iter().rev().find(|w| w.phase == Phase::Approach).expect("an approach").q;
-        let held = self.robot.tool_pose(&grasp).inverse() * plan.scene.block.isometry();
+        let held = self.robot.tool_pose(&grasp).inverse() * plan.scene.objects[0].pose.isometry();
         for pair in plan.waypoints.windows(2) {
             let (from, to) = (&pair[0].q, &pair[1].q);
             let way = (self.robot.tool_pose(to).translation.vector - self.robot.tool_pose(from).translation.vector).norm();
@@ -66,7 +64,7 @@ impl Oracle {
             let at = tool.translation.vector;
             hilt::math::hypot(at.x - x, at.y - y) < ZONE_M[0] && at.z - z < ZONE_M[1]
         };
-        let releasing = near(plan.scene.target_m());
+        let releasing = near(plan.scene.target_m(0));
         let moving = self.robot.links.iter().enumerate().skip(1);
         for (link, primitive) in moving.flat_map(|(link, l)| l.shapes.iter().map(move |shape| (link, shape))) {
             let solid = shape(primitive, &poses[link]);
@@ -76,8 +74,8 @@ impl Oracle {
             self.check_solid(&solid, &self.robot.links[link].name, [table, base, clearance_m]);
         }
         if let Some(held) = held {
-            let solid = (pose(&(tool * held)), SharedShape::new(Cuboid::new(vector([BLOCK_EDGE_M / 2.0; 3]))));
-            let supported = releasing || near(plan.scene.block.position_m);
+            let solid = (pose(&(tool * held)), SharedShape::new(Cuboid::new(vector(HALF_M))));
+            let supported = releasing || near(plan.scene.objects[0].pose.position_m);
             let support = if supported { f64::NEG_INFINITY } else { clearance_m };
             self.check_solid(&solid, "carried block", [support, support, clearance_m]);
         }

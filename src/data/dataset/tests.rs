@@ -5,14 +5,13 @@ use super::*;
 use crate::demo::Demo;
 use crate::error::Error;
 use crate::robot::file::built_in::paper_robot;
+use crate::task::built_in::pick_up;
 use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::fs;
 
-const TASK: Task = Task::PickUp;
-
 fn episode(number: usize) -> DatasetEpisode {
-    let (steps, layout) = (3 + number % 4, TASK.layout(&paper_robot()));
+    let (steps, layout) = (3 + number % 4, pick_up().layout(&paper_robot()));
     let numbers = |n: usize| (0..n).map(|i| (i * i) as f32 * 0.01 - number as f32).collect::<Vec<f32>>();
     let demo = Demo::new(&layout, numbers((steps + 1) * layout.state_dim()), numbers(steps * 9), numbers(steps * 9));
     let demo = demo.expect("a demo");
@@ -20,9 +19,9 @@ fn episode(number: usize) -> DatasetEpisode {
 }
 
 fn fill(dir: &Path, episodes: &Episodes, change: impl Fn(&mut Sizes)) -> Result<()> {
-    let (provenance, interrupt) = (Provenance::new("convert", TASK.name(), serde_json::json!({}), 0), Interrupt::default());
-    let robot = paper_robot();
-    let mut content = Content::new((&robot, TASK), &provenance, &interrupt);
+    let (provenance, interrupt) = (Provenance::new("convert", "pick-up", serde_json::json!({}), 0), Interrupt::default());
+    let (robot, task) = (paper_robot(), pick_up());
+    let mut content = Content::new((&robot, &task), &provenance, &interrupt);
     change(&mut content.sizes);
     content.fill(dir, episodes)
 }

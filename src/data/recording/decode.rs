@@ -1,5 +1,6 @@
 //! From the messages of `proto/hilt.proto` back to an episode. Every error says which message and field.
 
+use super::moment::{Moment, fixed, pose};
 use super::older;
 use super::topics::{OUTCOME_TOPIC, ROBOT_NAME, SCENE_TOPIC, STEP_TOPIC, TASK_NAME};
 use super::walk::Outline;
@@ -10,7 +11,7 @@ use crate::joints::Joints;
 use crate::robot::Robot;
 use crate::robot::file::built_in::paper_robot;
 use crate::scene::{Obstacle, Placed, Scene};
-use crate::state::{Pose, State};
+use crate::state::State;
 use crate::task::{FailureClass, Task, built_in};
 use prost::Message;
 use serde::de::DeserializeOwned;
@@ -176,14 +177,6 @@ fn step(message: proto::Step, t: usize, scene: &Scene, conditions: &[String]) ->
     })
 }
 
-/// What a step says of the task's objects.
-pub(super) struct Moment {
-    pub(super) seen: Vec<Pose>,
-    pub(super) goals: Vec<[f64; 3]>,
-    pub(super) objects: Vec<Body>,
-    pub(super) touches: Vec<proto::Touch>,
-}
-
 fn moment(message: &proto::Step) -> Result<Moment, String> {
     let body = |body: &proto::Body| Ok(Body { pose: pose("an object", body.pose.as_ref())?, speed_m_s: body.speed_m_s });
     Ok(Moment {
@@ -210,15 +203,6 @@ fn points(messages: &[proto::Point]) -> Result<Vec<[f64; 3]>, String> {
 fn exactly(name: &str, values: &[f64], expected: usize) -> Result<Joints, String> {
     let fits = Joints::of(values).filter(|joints| joints.len() == expected);
     fits.ok_or_else(|| format!("{name} has {} numbers, expected {expected}", values.len()))
-}
-
-pub(super) fn fixed<const N: usize>(name: &str, values: &[f64]) -> Result<[f64; N], String> {
-    values.try_into().map_err(|_| format!("{name} has {} numbers, expected {N}", values.len()))
-}
-
-pub(super) fn pose(name: &str, message: Option<&proto::Pose>) -> Result<Pose, String> {
-    let message = message.ok_or_else(|| format!("{name} is missing"))?;
-    Ok(Pose { position_m: fixed(name, &message.position_m)?, quaternion_xyzw: fixed(name, &message.quaternion_xyzw)? })
 }
 
 fn phase(code: i32) -> Result<Option<Phase>, String> {

@@ -16,6 +16,7 @@ mod decode;
 mod encode;
 mod fields;
 mod foxglove;
+mod moment;
 mod older;
 mod records;
 mod topics;

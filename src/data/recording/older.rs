@@ -1,6 +1,6 @@
 //! Recordings from when a task had one block, and a goal or a base block.
 
-use super::decode::{Moment, fixed, pose};
+use super::moment::{Moment, fixed, pose};
 use crate::data::proto;
 use crate::demo::Body;
 use crate::robot::Robot;

@@ -144,7 +144,7 @@ mod tests {
     use crate::math;
     use crate::nn::LANES;
     use crate::robot::file::built_in::paper_robot;
-    use crate::tasks::Task;
+    use crate::task::built_in::stack;
 
     #[test]
     fn sine_and_cosine_are_close() {
@@ -162,7 +162,7 @@ mod tests {
     fn the_hand_is_where_the_arms_own_kinematics_have_it() {
         // lane 5 holds the angles in question, the others something else
         let q = paper_robot().ready.map(|v| v + 0.3);
-        let arm = Arm::new(Task::Stack.layout(&paper_robot()).arm.as_ref().expect("the arm is known"));
+        let arm = Arm::new(stack().layout(&paper_robot()).arm.as_ref().expect("the arm is known"));
         let lanes = |v: &f64| Lanes(std::array::from_fn(|l| *v as f32 + 0.1 * (l as f32 - 5.0)));
         let hand = arm.hand(&q.iter().map(lanes).collect::<Vec<_>>());
         let (tool, jacobian) = paper_robot().tool_jacobian(&q);

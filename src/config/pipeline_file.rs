@@ -1,0 +1,50 @@
+//! The text of a pipeline file, as a table.
+
+use super::robot::is_file;
+use crate::error::{Error, Result};
+use crate::interrupt;
+use crate::words::shown;
+use std::fs::File;
+use std::io::Read;
+use std::path::Path;
+
+/// A pipeline file with every key is 4 kB long; this leaves room for comments and boxes \[bytes\].
+const LONGEST_FILE: u64 = 1 << 20;
+/// The key outside of all sections that may be overridden.
+pub(super) const ROBOT: &str = "robot";
+/// The key of the task.
+pub(super) const TASK: &str = "task";
+
+/// The table in a pipeline file. The files of a robot and of a task are named relative to the one that names them.
+pub(super) fn read_table(path: &Path) -> Result<toml::Table> {
+    let mut own = parsed(&read(path)?, &path.display().to_string())?;
+    for key in [ROBOT, TASK] {
+        let said = own.get(key).and_then(toml::Value::as_str).filter(|said| is_file(said));
+        if let Some(file) = said.map(|said| path.parent().unwrap_or(Path::new("")).join(said)) {
+            own.insert(key.into(), file.display().to_string().into());
+        }
+    }
+    Ok(own)
+}
+
+/// The table in a text.
+pub(super) fn parsed(text: &str, origin: &str) -> Result<toml::Table> {
+    text.parse().map_err(|e: toml::de::Error| {
+        let why: Vec<String> = e.to_string().trim_end().lines().map(shown).collect();
+        Error::Usage(format!("{origin} is not valid TOML: {}", why.join("\n")))
+    })
+}
+
+/// Whatever stands at `path`, a pipe too, is read up to a limit.
+fn read(path: &Path) -> Result<String> {
+    let io = |e| Error::io(path, "read", e);
+    let mut bytes = Vec::new();
+    let waits = interrupt::waiting();
+    File::open(path).map_err(io)?.take(LONGEST_FILE + 1).read_to_end(&mut bytes).map_err(io)?;
+    drop(waits);
+    let refuse = |why: String| Error::Usage(format!("{} is not a pipeline file: {why}", path.display()));
+    if bytes.len() as u64 > LONGEST_FILE {
+        return Err(refuse(format!("it is longer than {LONGEST_FILE} bytes")));
+    }
+    String::from_utf8(bytes).map_err(|_| refuse("it is not UTF-8 text".into()))
+}
