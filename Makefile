@@ -8,6 +8,11 @@ SEED   ?= 0
 PRESET ?= best
 # Robot: jaco, panda, ur5e, or the TOML file of another. Another than the pipeline's has a directory of its own, RUNS/ROBOT.
 ROBOT  ?=
+PAPER_TASKS := pick-up pick-and-place stack
+TASKS := $(PAPER_TASKS) tower sort bin
+# Where TASK is a file, that.
+TASK_FILE = $(if $(filter %.toml,$(TASK)),$(TASK))
+TASK_NAME = $(basename $(notdir $(TASK)))
 PIPELINE_best   = $(or $(TASK_FILE),pipelines/$(TASK).toml)
 # Of the paper's own tasks; what it did for stacking is what the preset has for others.
 PIPELINE_paper  = $(if $(filter $(PAPER_TASKS),$(TASK)),pipelines/paper/$(TASK).toml,pipelines/paper/other.toml)
@@ -64,11 +69,6 @@ override EPISODES   := $(strip $(call typed,EPISODES))
 override JOBS       := $(strip $(call typed,JOBS))
 override THREADS    := $(strip $(call typed,THREADS))
 
-PAPER_TASKS := pick-up pick-and-place stack
-TASKS := $(PAPER_TASKS) tower sort bin
-# Where TASK is a file, that.
-TASK_FILE = $(if $(filter %.toml,$(TASK)),$(TASK))
-TASK_NAME = $(basename $(notdir $(TASK)))
 PRESETS := best mended paper
 METHODS := hil bc sc ppo bc-rl
 # What a method learns from: by its artefact, the last stage before training.

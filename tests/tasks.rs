@@ -3,6 +3,7 @@
 use assert_cmd::Command;
 use hilt::config::{Pipeline, SceneSettings, Source};
 use hilt::data::{dataset, recording};
+use hilt::math::hypot;
 use hilt::robot::file::built_in::paper_robot;
 use hilt::seed::stream;
 use hilt::task::Target;
@@ -12,12 +13,15 @@ use std::path::Path;
 
 const COFFEE: &str = "fixtures/tasks/coffee.toml";
 
+/// What is replaced by what.
+type Replaced<'a> = &'a [(&'a str, &'a str)];
+
 fn load(path: &Path) -> Result<Pipeline, String> {
     Pipeline::load(&Source::File(path.to_path_buf(), None), &[]).map_err(|why| why.to_string())
 }
 
 /// The fixture with parts replaced.
-fn spoilt(replaced: &[(&str, &str)]) -> Result<Pipeline, String> {
+fn spoilt(replaced: Replaced) -> Result<Pipeline, String> {
     let text = replaced.iter().fold(fs::read_to_string(COFFEE).expect("the fixture"), |text, (from, to)| {
         assert!(text.contains(from), "the fixture has no {from}");
         text.replacen(from, to, 1)
@@ -58,14 +62,14 @@ fn scenes_are_drawn_from_the_places_of_the_file_with_room_between() {
         assert!((0.34..=0.46).contains(&cup[0]) && (-0.12..=-0.06).contains(&cup[1]) && cup[2] == 0.03, "{cup:?}");
         assert!((0.08..=0.14).contains(&sugar[1]) && saucer == [0.54, -0.02, 0.01], "{sugar:?} {saucer:?}");
         assert_eq!([0, 1, 2].map(|i| scene.objects[i].mass_kg), [0.15, 0.1, 0.5]);
-        let apart = |a: [f64; 3], b: [f64; 3]| (a[0] - b[0]).hypot(a[1] - b[1]);
+        let apart = |a: [f64; 3], b: [f64; 3]| hypot(a[0] - b[0], a[1] - b[1]);
         assert!(apart(cup, sugar) >= 0.095 && apart(cup, saucer) >= 0.12 && apart(sugar, scene.goals[0]) >= 0.10);
     }
 }
 
 #[test]
 fn a_pipeline_file_without_a_sound_task_is_refused_by_its_key() {
-    let cases: [(&[(&str, &str)], &[&str]); 9] = [
+    let cases: [(Replaced, &[&str]); 9] = [
         (&[("on = \"saucer\"", "on = \"sauce\"")], &["task", "unknown object \"sauce\"; did you mean saucer?"]),
         (&[("name = \"sugar\"", "name = \"cup\"")], &["two objects are called \"cup\""]),
         (&[("place = \"sugar\"", "move = \"sugar\"")], &["unknown field `move`", "`place`"]),
@@ -84,14 +88,17 @@ fn a_pipeline_file_without_a_sound_task_is_refused_by_its_key() {
 
 #[test]
 fn places_without_room_are_named() {
-    let refused = |replaced: &[(&str, &str)]| {
+    let refused = |replaced: Replaced| {
         let task = spoilt(replaced).expect("a task").task;
         let drawn = draw_scene(&paper_robot(), &task, &SceneSettings::default(), &mut stream(3, "tasks test", 0));
         drawn.expect_err("no room").to_string()
     };
     // Two objects in one place; one out of reach; a goal that is.
     let why = refused(&[("x_m = [0.34, 0.46]\ny_m = [0.08, 0.14]", "x_m = 0.54\ny_m = 0.02")]);
-    assert!(why.contains("\"sugar\" at x 0.54 m, y 0.02 m") && why.contains("0.05 m apart") && why.contains("x_m, y_m of"), "{why}");
+    assert!(
+        why.contains("\"sugar\" at x 0.54 m, y 0.02 m") && why.contains("0.05 m apart") && why.contains("x_m, y_m of"),
+        "{why}"
+    );
     let why = refused(&[("x_m = [0.34, 0.46]\ny_m = [-0.12, -0.06]", "x_m = [1.2, 1.4]\ny_m = 0.0")]);
     assert!(why.contains("\"cup\" at x [1.2, 1.4] m") && why.contains("0.295 to 0.68 m around the foot"), "{why}");
     let why = refused(&[("x_m = 0.50\ny_m = [0.14, 0.18]", "x_m = -1.5\ny_m = 0.0")]);
@@ -112,7 +119,8 @@ fn a_task_of_ones_own_goes_through_every_stage_on_a_robot_of_ones_own() {
     run(&["plan", "--episodes", "4", "--out", &at("plans.parquet")]);
     run(&["simulate", "--plans", &at("plans.parquet"), "--out", &at("recordings"), "--set", "simulate.pulses.probability=0"]);
     for index in 0..4 {
-        let (episode, _) = recording::read(&dir.path().join("recordings").join(recording::file_name(index))).expect("a recording");
+        let (episode, _) =
+            recording::read(&dir.path().join("recordings").join(recording::file_name(index))).expect("a recording");
         assert!(episode.success, "{index}: {:?}", episode.failure);
         let names: Vec<&str> = episode.scene.task.objects.iter().map(|object| object.name.as_str()).collect();
         assert_eq!((names, episode.last.objects.len()), (vec!["cup", "sugar", "saucer"], 3));
@@ -147,23 +155,45 @@ fn a_task_of_ones_own_goes_through_every_stage_on_a_robot_of_ones_own() {
 #[test]
 fn the_page_is_read_as_it_stands_and_its_commands_run() {
     let page = fs::read_to_string("docs/add-a-task.md").expect("the page");
-    let block = |kind: &str| page.split(&format!("```{kind}\n")).nth(1).and_then(|rest| rest.split("```").next()).expect("a block");
+    let block =
+        |kind: &str| page.split(&format!("```{kind}\n")).nth(1).and_then(|rest| rest.split("```").next()).expect("a block");
     let dir = tempfile::tempdir().expect("a directory");
     fs::write(dir.path().join("coffee.toml"), block("toml")).expect("a file");
     let pipeline = load(&dir.path().join("coffee.toml")).expect("the page's task");
     assert_eq!((pipeline.task.objects.len(), pipeline.task.goals.len(), pipeline.plan.episodes), (4, 2, 360));
     for key in [
-        "name", "instruction", "box_m", "cylinder_m", "bin_m", "at", "x_m", "y_m", "yaw_rad", "friction", "mass_kg", "grip_m", "lift",
-        "height_m", "place", "tolerance_m", "on", "in",
+        "name",
+        "instruction",
+        "box_m",
+        "cylinder_m",
+        "bin_m",
+        "at",
+        "x_m",
+        "y_m",
+        "yaw_rad",
+        "friction",
+        "mass_kg",
+        "grip_m",
+        "lift",
+        "height_m",
+        "place",
+        "tolerance_m",
+        "on",
+        "in",
     ] {
         assert!(page.contains(&format!("{key} =")) || page.contains(&format!("`{key}`")), "{key} is not on the page");
     }
     let bin = Path::new(env!("CARGO_BIN_EXE_hilt")).parent().expect("a directory").display().to_string();
     let path = format!("{bin}:{}", std::env::var("PATH").expect("set"));
     // Make builds and trains; tests/make runs it with a task from a file.
-    let commands: String = block("sh").lines().filter(|line| !line.starts_with("make ")).map(|line| format!("{line}\n")).collect();
+    let commands: String =
+        block("sh").lines().filter(|line| !line.starts_with("make ")).map(|line| format!("{line}\n")).collect();
     let ended = std::process::Command::new("bash").args(["-euc", &commands]).env("PATH", path).current_dir(dir.path()).output();
     let ended = ended.expect("bash");
     let said = String::from_utf8_lossy(&ended.stdout);
-    assert!(ended.status.success() && said.contains("coffee: success 20 of 20"), "{said}{}", String::from_utf8_lossy(&ended.stderr));
+    assert!(
+        ended.status.success() && said.contains("coffee: success 20 of 20"),
+        "{said}{}",
+        String::from_utf8_lossy(&ended.stderr)
+    );
 }

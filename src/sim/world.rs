@@ -193,7 +193,8 @@ fn insert_object(physics: &mut PhysicsWorld, number: usize, shape: &Shape, at: &
         }
         Shape::Cylinder { radius_m, height_m } => {
             let (r, h, side) = (radius_m, height_m, 2.0 * FRAC_PI_2 / f64::from(CYLINDER_SIDES));
-            let across = vector([mass_kg * (3.0 * r * r + h * h) / 12.0, mass_kg * (3.0 * r * r + h * h) / 12.0, mass_kg * r * r / 2.0]);
+            let across =
+                vector([mass_kg * (3.0 * r * r + h * h) / 12.0, mass_kg * (3.0 * r * r + h * h) / 12.0, mass_kg * r * r / 2.0]);
             physics.bodies[body].set_additional_mass_properties(MassProperties::new(Vector::ZERO, mass, across), true);
             for k in 0..CYLINDER_SIDES / 2 {
                 let turn = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), 2.0 * side * f64::from(k));

@@ -143,7 +143,10 @@ fn check_goal(task: &Task, k: usize) -> Result<(), String> {
             };
             if let Some(before) = task.goals[..k].iter().position(|goal| goal.target == Target::In(*other)) {
                 let there = name(task.goals[before].object);
-                return Err(format!("\"{}\" has \"{there}\" in its middle already (goal {before}); give each a bin", name(*other)));
+                return Err(format!(
+                    "\"{}\" has \"{there}\" in its middle already (goal {before}); give each a bin",
+                    name(*other)
+                ));
             }
             let narrow = inner_m[0].min(inner_m[1]);
             let wide = 2.0 * object.shape.half_width_m();

@@ -266,11 +266,15 @@ mod tests {
 
     #[test]
     fn what_goals_move_comes_first_and_the_rest_follows_from_the_file() {
-        let task = read(&[BIN, CUBE, CAN], &[r#"{ place = "can", in = "bin" }"#, r#"{ lift = "cube", height_m = 0.2 }"#]).expect("a task");
+        let task = read(&[BIN, CUBE, CAN], &[r#"{ place = "can", in = "bin" }"#, r#"{ lift = "cube", height_m = 0.2 }"#])
+            .expect("a task");
         let names: Vec<&str> = task.objects.iter().map(|object| object.name.as_str()).collect();
         assert_eq!((names, task.moved()), (vec!["cube", "can", "bin"], 2));
         assert_eq!((task.goals[0].object, &task.goals[0].target), (1, &Target::In(2)));
-        assert_eq!(task.instruction, "Pick up the can and put it into the bin, then pick up the cube and hold it 20 cm above the table.");
+        assert_eq!(
+            task.instruction,
+            "Pick up the can and put it into the bin, then pick up the cube and hold it 20 cm above the table."
+        );
         let names = ["can.reached", "can.grasped", "can.lifted", "can.in_bin", "can.released", "can.on_table", "can.at_rest"];
         assert_eq!(task.condition_names()[..7], names);
     }
@@ -305,7 +309,11 @@ mod tests {
             (&[CUBE], &[r#"{ place = "cube", at = "goal", height_m = 0.2 }"#], "height_m goes with lift"),
             (&[CUBE], &[r#"{ place = "cube", on = "cube" }"#], "on or into itself"),
             (&[CUBE, CAN], &[lift, r#"{ place = "can", on = "cube" }"#], "must be the last goal"),
-            (&[CUBE, CAN], &[r#"{ place = "can", on = "cube" }"#, r#"{ place = "cube", at = "goal" }"#], "\"cube\" is moved later"),
+            (
+                &[CUBE, CAN],
+                &[r#"{ place = "can", on = "cube" }"#, r#"{ place = "cube", at = "goal" }"#],
+                "\"cube\" is moved later",
+            ),
             (&[CUBE], &[r#"{ place = "cube", at = "goal" }"#, lift], "moved by goal 0 already; one goal an object"),
             (&[CUBE, BIN], &[r#"{ place = "cube", on = "bin" }"#], "say in = \"bin\""),
             (&[CUBE, CAN], &[r#"{ place = "cube", in = "can" }"#], "is no bin"),
@@ -317,7 +325,11 @@ mod tests {
             ),
             (&[r#"{ name = "cube", box_m = [0.2, 0.2, 0.2], at = "spawn" }"#], &[lift], "more than the 0.12 m that a hand opens"),
             (&[r#"{ name = "cube", at = "spawn" }"#], &[lift], "which shape?"),
-            (&[r#"{ name = "a cube", box_m = [0.05, 0.05, 0.05], at = "spawn" }"#], &[r#"{ lift = "a cube", height_m = 0.2 }"#], "lower-case"),
+            (
+                &[r#"{ name = "a cube", box_m = [0.05, 0.05, 0.05], at = "spawn" }"#],
+                &[r#"{ lift = "a cube", height_m = 0.2 }"#],
+                "lower-case",
+            ),
         ];
         for (objects, goals, expected) in cases {
             let why = read(objects, goals).expect_err(expected);
