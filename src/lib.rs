@@ -21,7 +21,7 @@
 //! | BC + RL, which the paper compares with | [`learn::methods::bc_rl`] | BC, then L_RL + lambda L_BC |
 //! | PPO, which the paper compares with | [`learn::methods::ppo`] | learns in the simulator from rewards alone |
 //! | N(0, .001) on actions | [`sim`] | noise while demos are recorded and policies evaluated |
-//! | tasks, milestones, success | [`tasks`] | pick-up, pick-and-place, stack: one file each |
+//! | tasks, milestones, success | [`task`], [`tasks`] | a task as its file says it; what follows from it, one file a kind of goal |
 //! | success rates | [`eval`] | seeded rollouts, Wilson intervals, failures by class |
 //! | rho, alpha, tau, ... | [`config`] | every choice is a key; `pipelines/paper` sets them as literally as can work |
 //!
