@@ -106,13 +106,13 @@ impl Planner {
 
     /// From where the hand is down to the grasp, and the fingers closed.
     fn approach(&mut self, with: &Try, rng: &mut impl Rng) -> Result<Vec<Piece>, PlanError> {
-        let (block, grasp) = (Moved::Free(with.pose()), with.grasp);
+        let (standing, grasp) = (Moved::Free(with.pose()), with.grasp);
         let above = raised(&grasp, PREGRASP_RISE_M);
         let name = &with.object().name;
         let q_above = self.motions.reach(&above, &with.start, &format!("above the {name}"))?;
         let q = self.motions.reach(&grasp, &q_above, &format!("at the {name}"))?;
         with.world
-            .check(&q, &block, with.margin_m)
+            .check(&q, &standing, with.margin_m)
             .map_err(|why| PlanError::Grasp(format!("with the open hand around the {name}, {why}")))?;
         let leg = Leg {
             phase: Phase::Approach,
@@ -120,7 +120,7 @@ impl Planner {
             from: with.from,
             to: above,
             after: vec![grasp],
-            moved: block,
+            moved: standing,
             margin_m: with.margin_m,
             start: with.start,
         };
