@@ -1,6 +1,6 @@
 //! One file a method, and what methods share.
 
-mod batches;
+pub mod batches;
 pub mod bc_rl;
 mod cost;
 pub mod descent;

@@ -36,7 +36,7 @@ pub struct Policy {
 
 impl Policy {
     /// A policy with random weights; scalings and horizon from the training demos.
-    pub(in crate::learn) fn new(corpus: &Corpus, settings: &TrainSettings, rng: &mut impl Rng) -> Self {
+    pub fn new(corpus: &Corpus, settings: &TrainSettings, rng: &mut impl Rng) -> Self {
         let features = Features::fit(corpus, settings.features, settings.mask_dq);
         let dim = corpus.layout.action_dim();
         let action = Scaling::fit(
