@@ -59,7 +59,10 @@ pub fn episode(task: &Arc<Task>, index: u64, steps: usize) -> Episode {
 
 fn step(scene: &Scene, t: usize, rng: &mut ChaCha8Rng) -> Step {
     let objects = scene.objects.len();
-    let seen: Vec<Pose> = (0..objects).map(|_| pose(rng)).collect();
+    let now: Vec<Body> = (0..objects).map(|_| Body { pose: pose(rng), speed_m_s: rng.random() }).collect();
+    let mut state = State { q: numbers(rng), dq: numbers(rng), ..scene.start() };
+    let moved = scene.task.moved();
+    state.objects.iter_mut().zip(&now).take(moved).for_each(|(seen, now)| *seen = now.pose);
     let mut commanded = numbers(rng);
     commanded[3] = -0.0;
     // Each object touches the one before it.
@@ -70,8 +73,8 @@ fn step(scene: &Scene, t: usize, rng: &mut ChaCha8Rng) -> Step {
     };
     let touches = (0..objects).map(&mut touch).collect();
     Step {
-        state: State { q: numbers(rng), dq: numbers(rng), objects: seen, goals: scene.goals.clone() },
-        objects: (0..objects).map(|_| Body { pose: pose(rng), speed_m_s: rng.random() }).collect(),
+        state,
+        objects: now,
         commanded,
         executed: numbers(rng),
         contacts: Contacts { objects: touches, robot_obstacle: rng.random(), robot_table: rng.random() },

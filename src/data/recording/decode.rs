@@ -129,6 +129,10 @@ fn scene(robot: &Arc<Robot>, task: Option<&Arc<Task>>, message: proto::Scene) ->
                 let (friction, mass_kg) = (placed.friction, placed.mass_kg);
                 Ok(Placed { pose: pose(&placed.name, placed.pose.as_ref())?, friction, mass_kg })
             };
+            let names = message.objects.iter().map(|placed| &placed.name);
+            if !names.clone().eq(task.objects.iter().map(|object| &object.name)) {
+                return Err(format!("its scene has the objects {:?}, which are not those of {task}", names.collect::<Vec<_>>()));
+            }
             let objects = message.objects.iter().map(placed).collect::<Result<_, String>>()?;
             Scene { robot, task, objects, goals: points(&message.goals)?, obstacles }
         }
@@ -148,7 +152,7 @@ fn step(message: proto::Step, t: usize, scene: &Scene, conditions: &[String]) ->
     if names != conditions {
         return Err(format!("step {t} has the conditions {names:?}, {task} has {conditions:?}"));
     }
-    let found = if message.block.is_some() { older::moment(&message, scene)? } else { moment(&message)? };
+    let found = if message.block.is_some() { older::moment(&message, scene)? } else { moment(&message, scene)? };
     let counts = [found.seen.len(), found.objects.len(), found.touches.len()];
     if counts != [task.objects.len(); 3] || found.goals.len() != scene.goals.len() {
         return Err(format!("step {t} has the goal, base block or objects of another task than {task}"));
@@ -177,12 +181,15 @@ fn step(message: proto::Step, t: usize, scene: &Scene, conditions: &[String]) ->
     })
 }
 
-fn moment(message: &proto::Step) -> Result<Moment, String> {
+/// What goals move is seen as it is now, the rest as the scene has it.
+fn moment(message: &proto::Step, scene: &Scene) -> Result<Moment, String> {
     let body = |body: &proto::Body| Ok(Body { pose: pose("an object", body.pose.as_ref())?, speed_m_s: body.speed_m_s });
+    let objects = message.objects.iter().map(body).collect::<Result<Vec<Body>, String>>()?;
+    let moved = objects.iter().take(scene.task.moved()).map(|object| object.pose);
     Ok(Moment {
-        seen: message.seen.iter().map(|at| pose("an object that is seen", Some(at))).collect::<Result<_, _>>()?,
-        goals: points(&message.goals)?,
-        objects: message.objects.iter().map(body).collect::<Result<_, String>>()?,
+        seen: moved.chain(scene.objects.iter().skip(scene.task.moved()).map(|object| object.pose)).collect(),
+        goals: scene.goals.clone(),
+        objects,
         touches: message.contacts.as_ref().map_or_else(Vec::new, |contacts| contacts.objects.clone()),
     })
 }

@@ -19,8 +19,6 @@ pub(super) fn step(step: &Step, conditions: &[String], number: usize, final_stat
         conditions: conditions.map(|(name, holds)| proto::Condition { name: name.clone(), holds: *holds }).collect(),
         phase: phase(step.phase).into(),
         final_state,
-        seen: step.state.objects.iter().map(pose).collect(),
-        goals: step.state.goals.iter().map(point).collect(),
         objects: step.objects.iter().map(body).collect(),
         ..proto::Step::default()
     }
