@@ -6,9 +6,10 @@ use hilt::joints::Joints;
 use hilt::math::sin_cos;
 use hilt::robot::Robot;
 use hilt::robot::file::built_in::all;
+use hilt::scene::Scene;
 use hilt::sim::{Controller, World};
-use hilt::task::Task;
 use hilt::task::built_in::{find, pick_and_place, pick_up, stack};
+use hilt::task::{GRASP_OVER_CENTER_M, Task};
 use std::f64::consts::TAU;
 use std::sync::Arc;
 
@@ -28,11 +29,16 @@ fn held() -> [Arc<Task>; 2] {
     [pick_up(), find("bin").expect("a task")]
 }
 
+/// The first object lifted, held where its task says.
+fn lift(scene: &Scene) -> Script {
+    Script::lift(&scene.objects[0].pose).gripped_higher(scene.task.objects[0].grip_m - GRASP_OVER_CENTER_M)
+}
+
 fn lifted_height(robot: &Arc<Robot>, task: &Arc<Task>, index: u64, friction: f64) -> f64 {
     let mut scene = scene_of(robot, task, index);
     scene.objects[0].friction = friction;
     let mut world = World::new(&scene);
-    play(&mut world, &mut Script::lift(&scene.objects[0].pose), 60).state.objects[0].position_m[2]
+    play(&mut world, &mut lift(&scene), 60).state.objects[0].position_m[2]
 }
 
 #[test]
@@ -51,7 +57,7 @@ fn friction_and_nothing_else_lifts_block_and_can() {
 fn slip(robot: &Arc<Robot>, task: &Arc<Task>, index: u64, swing_rad_s: f64) -> f64 {
     let scene = scene_of(robot, task, index);
     let mut world = World::new(&scene);
-    let mut script = Script::lift(&scene.objects[0].pose);
+    let mut script = lift(&scene);
     let before = in_hand(&play(&mut world, &mut script, 40));
     for t in 0..FIVE_SECONDS {
         let seen = world.observe();

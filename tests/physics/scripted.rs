@@ -54,6 +54,13 @@ impl Script {
         Script { yaw, legs, at: 0, waited: 0 }
     }
 
+    /// The same with the object held this much higher \[m\].
+    #[allow(dead_code, reason = "benches share this file and lift cubes")]
+    pub fn gripped_higher(mut self, by_m: f64) -> Self {
+        self.legs[1..3].iter_mut().for_each(|leg| leg.tool_m[2] += by_m);
+        self
+    }
+
     /// [`Script::lift`], then to above `goal_m` (of the block's centre), down, open, up.
     pub fn carry(block: &Pose, goal_m: [f64; 3]) -> Self {
         let mut script = Script::lift(block);
