@@ -9,7 +9,7 @@ use crate::task::{Object, Target};
 use nalgebra::Translation3;
 use std::f64::consts::FRAC_PI_2;
 
-/// Height over the grasp from which the hand comes straight down \[m\]: open fingertips pass above the block.
+/// Height over the grasp from which the hand comes straight down \[m\]: open fingertips pass above a 5 cm cube.
 pub(super) const PREGRASP_RISE_M: f64 = 0.09;
 /// How far above what counts an object is lifted \[m\].
 const OVER_HEIGHT_M: f64 = 0.035;

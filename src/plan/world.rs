@@ -10,7 +10,7 @@ use crate::task::Target;
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 use std::sync::Arc;
 
-/// Least distance of arm and carried block to anything fixed, in a finished plan \[m\].
+/// Least distance of arm and carried object to anything fixed, in a finished plan \[m\].
 pub const CLEARANCE_M: f64 = 0.01;
 /// Distances that hand poses and paths keep before smoothing \[m\]: first twice as much, so that noise in execution has room; then what must be.
 pub(super) const PATH_CLEARANCES_M: [f64; 2] = [2.0 * CLEARANCE_M, CLEARANCE_M];

@@ -1,4 +1,4 @@
-//! Contact physics: the arm, the table, the blocks and the obstacles in one rapier world, stepped at the control rate.
+//! Contact physics: the robot, the table, the objects of a task and the obstacles in one rapier world, stepped at the control rate.
 //! The only module that knows rapier.
 
 mod arm;

@@ -19,11 +19,11 @@ pub struct Grain {
 /// Settings of the contact physics.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Physics {
-    /// While the robot is near anything, or a block moves. Default: substeps of 6.25 ms (measured under noise of 0.1 rad/s, ten times
+    /// While the robot is near anything, or an object moves. Default: substeps of 6.25 ms (measured under noise of 0.1 rad/s, ten times
     /// the paper's variance: stacks 90 of 100; with 3 substeps 64) and 6 sweeps (8 stack as many and cost a fifth more time; 2 lose one
     /// grasp in seven).
     pub near: Grain,
-    /// While nothing can touch the robot within a control step and the blocks rest. Default: the same.
+    /// While nothing can touch the robot within a control step and the objects rest. Default: the same.
     pub free: Grain,
     /// Sweeps that take out the velocity with which penetration was pushed out.
     pub relaxations: usize,

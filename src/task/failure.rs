@@ -21,7 +21,7 @@ pub enum FailureClass {
     TimedOut,
     /// The controller asked for a velocity that is no finite number.
     CommandNotFinite,
-    /// The contact physics ended in numbers that are none: an arm pressed into a box, a block too light for its precision.
+    /// The contact physics ended in numbers that are none: an arm pressed into a box, an object too light for its precision.
     SimulationBrokeDown,
 }
 
@@ -50,13 +50,13 @@ impl FailureClass {
 
     fn names(self) -> [&'static str; 2] {
         match self {
-            FailureClass::NeverReached => ["never_reached", "the hand never came within reach of the block"],
-            FailureClass::NeverGrasped => ["never_grasped", "the block was reached, but never held between the fingers"],
+            FailureClass::NeverReached => ["never_reached", "the hand never came within reach of the object"],
+            FailureClass::NeverGrasped => ["never_grasped", "the object was reached, but never held between the fingers"],
             FailureClass::Toppled => {
-                ["toppled", "the block lies over or fell off the base block, or the base block was pushed away"]
+                ["toppled", "the object lies over or fell off what it was put on, or what it is to be put on was pushed away"]
             }
-            FailureClass::Dropped => ["dropped", "the block was held once and lost in the air"],
-            FailureClass::Misplaced => ["misplaced", "the block was released, but not where the task wants it"],
+            FailureClass::Dropped => ["dropped", "the object was held once and lost in the air"],
+            FailureClass::Misplaced => ["misplaced", "the object was released, but not where the task wants it"],
             FailureClass::TimedOut => ["timed_out", "the steps ran out on the way"],
             FailureClass::CommandNotFinite => ["command_not_finite", "a command was no finite number"],
             FailureClass::SimulationBrokeDown => ["simulation_broke_down", "the simulation ended in numbers that are none"],

@@ -25,7 +25,7 @@ use nalgebra::Vector3;
 const MOST: f64 = 8.0;
 /// Distances are told apart within this \[m\]: near(d) is 1/2 at 11 cm.
 const NEAR_M: f64 = 0.2;
-/// The fingers are around the block when the tool point is within this of its centre \[m\]; above the block it is not.
+/// The fingers are around the object when the tool point is within this of its centre \[m\]; above a 5 cm cube it is not.
 const AROUND_M: f64 = 0.03;
 /// Speeds are told apart within this \[m/s\].
 const STILL_M_S: f64 = 0.1;
