@@ -139,3 +139,38 @@ impl Scene {
         scene
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::robot::file::built_in::paper_robot;
+    use crate::task::built_in::{pick_and_place, pick_up, stack};
+
+    const POSE: &str = r#"{"position_m":[0.4,-0.1,0.025],"quaternion_xyzw":[0.0,0.0,0.0,1.0]}"#;
+
+    /// A scene as plans had it when there were one block, and a goal or a base block.
+    fn older(task: &str, context: &str) -> String {
+        let rest = r#""obstacles":[{"center_m":[0.4,0.1,0.1],"size_m":[0.02,0.3,0.2]}],"friction":0.7,"block_mass_kg":0.2"#;
+        format!(r#"{{"task":"{task}","block":{POSE},"context":{context},{rest}}}"#)
+    }
+
+    #[test]
+    fn scenes_of_older_plans_are_read() {
+        let block = Pose::from_yaw([0.4, -0.1, 0.025], 0.0);
+        let placed = |friction| Placed { pose: block, friction, mass_kg: 0.2 };
+        let base = format!(r#"{{"base":{POSE}}}"#);
+        for (task, context, objects, goals) in [
+            (pick_up(), "\"none\"", vec![placed(0.7)], vec![]),
+            (pick_and_place(), r#"{"goal":[0.5,0.1,0.025]}"#, vec![placed(0.7)], vec![[0.5, 0.1, 0.025]]),
+            (stack(), &base, vec![placed(0.7), placed(1.0)], vec![]),
+        ] {
+            let text = older(&task.name, context);
+            let scene = Scene::from_json(&paper_robot(), &task, &text).expect("an older scene");
+            assert_eq!((&scene.objects, &scene.goals, scene.obstacles.len()), (&objects, &goals, 1));
+            let again = Scene::from_json(&paper_robot(), &task, &scene.to_json().to_string()).expect("a scene");
+            assert_eq!(again, scene);
+        }
+        let why = Scene::from_json(&paper_robot(), &stack(), &older("pick-up", "\"none\"")).expect_err("another task");
+        assert!(why.contains("it is of pick-up, not of stack"), "{why}");
+    }
+}

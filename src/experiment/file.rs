@@ -133,6 +133,7 @@ fn of_text(name: &str, path: &Path, text: &str, overrides: &Overrides) -> std::r
         report: raw.report.map_or(Ok(ReportKind::default()), |word| word.parse())?,
         reference: raw.reference,
         tasks: task_names(&raw.tasks)?,
+        said: raw.tasks,
         methods: parsed(&raw.methods)?,
         presets,
         seeds,
@@ -147,7 +148,7 @@ fn of_text(name: &str, path: &Path, text: &str, overrides: &Overrides) -> std::r
         not_empty(list)?;
     }
     not_empty(("seeds", experiment.seeds.len()))?;
-    distinct("tasks", &raw.tasks)?;
+    distinct("tasks", &experiment.tasks)?;
     distinct("methods", &raw.methods)?;
     distinct("presets", &experiment.presets)?;
     for variation in &raw.variation {

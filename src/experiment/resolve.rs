@@ -1,7 +1,7 @@
 //! The settings of every stage for one task, preset and variation.
 
 use super::spec::{Experiment, Variation};
-use crate::config::{ChosenTask, Pipeline, Preset, Source, Stage};
+use crate::config::{ChosenTask, Pipeline, Preset, Source, Stage, is_file};
 use crate::error::{Error, Result};
 use crate::learn::MethodName;
 use crate::plan::check_ready_pose;
@@ -84,7 +84,8 @@ pub fn cell(experiment: &Experiment, task: &str, preset: &str, variation: Option
         other => other,
     };
     variation.map_or(Ok(()), check_variation).map_err(|why| Error::Usage(format!("{at}: {why}")))?;
-    let (source, words) = source_of(task, preset).map_err(|why| Error::Usage(format!("{at}: {why}")))?;
+    let said = experiment.tasks.iter().zip(&experiment.said).find(|(name, _)| *name == task).map_or(task, |(_, said)| said);
+    let (source, words) = source_of((task, said), preset).map_err(|why| Error::Usage(format!("{at}: {why}")))?;
     let stages = Stage::ALL.map(|stage| stage_settings(experiment, stage, &source, &words, variation));
     let mut resolved = Vec::with_capacity(Stage::ALL.len());
     for stage in stages {
@@ -116,16 +117,21 @@ fn section_of(set: &str) -> &str {
     set.split(['.', '=']).next().unwrap_or_default().trim()
 }
 
-fn source_of(task: &str, preset: &str) -> std::result::Result<(Source, Vec<String>), String> {
+/// `said` is how the experiment has the task: by its name or its file.
+fn source_of((task, said): (&str, &str), preset: &str) -> std::result::Result<(Source, Vec<String>), String> {
     if let Ok(known) = preset.parse::<Preset>() {
-        let words = ["--task".to_string(), task.into(), "--preset".into(), preset.into()];
+        let words = ["--task".to_string(), said.into(), "--preset".into(), preset.into()];
         let words = if known == Preset::default() { words[..2].to_vec() } else { words.to_vec() };
-        return Ok((Source::BuiltIn(ChosenTask::read(task)?, known), words));
+        // A task's file is a pipeline file: its own settings, unless another preset is asked for.
+        if is_file(said) && known == Preset::default() {
+            return Ok((Source::File(said.into(), None), words));
+        }
+        return Ok((Source::BuiltIn(ChosenTask::read(said)?, known), words));
     }
     let path = Path::new(PIPELINES).join(preset).join(format!("{task}.toml"));
     if path.is_file() {
-        let words = vec!["--pipeline".into(), path.display().to_string(), "--task".into(), task.into()];
-        return Ok((Source::File(path, Some(ChosenTask::read(task)?)), words));
+        let words = vec!["--pipeline".into(), path.display().to_string(), "--task".into(), said.into()];
+        return Ok((Source::File(path, Some(ChosenTask::read(said)?)), words));
     }
     let has_file = |dir: &Path| dir.join(format!("{task}.toml")).is_file();
     let entries = fs::read_dir(PIPELINES).into_iter().flatten().flatten();

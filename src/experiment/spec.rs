@@ -22,6 +22,8 @@ pub struct Experiment {
     pub reference: Option<String>,
     /// Names of its tasks.
     pub tasks: Vec<String>,
+    /// As its file says them: the same names, or files.
+    pub said: Vec<String>,
     /// Presets: those that come with hilt, or directories below `pipelines` with a file a task.
     pub presets: Vec<String>,
     /// Methods.

@@ -44,6 +44,24 @@ fn grid(text: &str) -> Grid {
     Grid::expand(&experiment(text), Path::new("out")).unwrap_or_else(|why| panic!("{why}"))
 }
 
+#[test]
+fn a_task_from_a_file_is_one_like_others() {
+    let file = "fixtures/tasks/coffee.toml";
+    let grid =
+        grid(&format!("tasks = [\"stack\", \"{file}\"]\nmethods = [\"bc\"]\nseeds = \"3\"\npresets = [\"best\", \"paper\"]"));
+    let tasks: Vec<&str> = grid.runs.iter().map(|run| run.task.as_str()).collect();
+    assert_eq!(tasks, ["stack", "stack", "coffee", "coffee"]);
+    let step = |id: &str| grid.steps.iter().find(|step| step.id == id).unwrap_or_else(|| panic!("no step {id}"));
+    let (plan, paper) = (step("coffee/seed-3/best/plan"), step("coffee/seed-3/paper/plan"));
+    assert!(plan.words.join(" ").starts_with(&format!("plan --task {file} ")), "{:?}", plan.words);
+    assert!(paper.words.join(" ").contains(&format!("--task {file} --preset paper")), "{:?}", paper.words);
+    // Its own file's settings; under the paper's preset those of stacking. What it is stands in both.
+    let of =
+        |step: &super::Step| (step.provenance.settings["plan"]["episodes"].clone(), step.provenance.settings["task"].clone());
+    assert_eq!((of(plan).0, of(paper).0), (30.into(), 300.into()));
+    assert_eq!((of(plan).1["name"].as_str(), of(plan).1), (Some("coffee"), of(paper).1));
+}
+
 /// Identities of the steps of seed 3.
 fn of_seed_3(grid: &Grid) -> BTreeSet<&str> {
     grid.steps.iter().filter(|step| step.seed == 3).map(|step| step.id.as_str()).collect()

@@ -1,7 +1,6 @@
 //! Words of an experiment's file: names, keys and lists, and what is wrong with them.
 
-use crate::config::Stage;
-use crate::task::built_in;
+use crate::config::{ChosenTask, Stage};
 use crate::words::{did_you_mean, shown, unknown};
 use std::collections::BTreeSet;
 
@@ -15,9 +14,9 @@ pub(super) fn parsed<T: std::str::FromStr<Err = String>>(words: &[String]) -> st
     words.iter().map(|word| word.parse()).collect()
 }
 
-/// Names of tasks, each of one that there is.
+/// Names of tasks, each of one that there is: with hilt, or in a file.
 pub(super) fn task_names(words: &[String]) -> std::result::Result<Vec<String>, String> {
-    words.iter().map(|word| built_in::find(word).map(|task| task.name.clone())).collect()
+    words.iter().map(|word| ChosenTask::read(word).map(|task| task.name.clone())).collect()
 }
 
 pub(super) fn check_keys(table: &toml::Table, known: &[&str]) -> std::result::Result<(), String> {
