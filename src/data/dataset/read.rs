@@ -131,10 +131,11 @@ fn also_rewritten(error: Error, rewritten: Option<&Path>) -> Error {
 pub fn read_for(root: &Path, task: &str) -> Result<Dataset> {
     let dataset = read(root)?;
     if dataset.task != task {
-        // What a task adds that stays as it is does not depend on the robot.
-        let fixed = |layout: &Layout| layout.state_dim() - layout.changing();
+        // What a task adds to the joints does not depend on the robot.
+        let joints = |layout: &Layout| layout.positions().len() + layout.velocities().len();
+        let beside = |layout: &Layout| layout.state_dim() - joints(layout);
         let (found, layout) = (&dataset.task, &dataset.layout);
-        let wanted = |task: Arc<Task>| format!(" ({})", layout.changing() + fixed(&task.layout(&paper_robot())));
+        let wanted = |task: Arc<Task>| format!(" ({})", joints(layout) + beside(&task.layout(&paper_robot())));
         let (dim, wanted) = (layout.state_dim(), built_in::find(task).map(wanted).unwrap_or_default());
         return Err(Error::input(root, format!("is a dataset of {found} (states of {dim} numbers), not of {task}{wanted}")));
     }
