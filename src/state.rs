@@ -35,6 +35,11 @@ impl Pose {
         Pose { position_m, quaternion_xyzw: [0.0, 0.0, sin, cos] }
     }
 
+    /// Turn about the world's z axis \[rad\].
+    pub fn yaw_rad(&self) -> f64 {
+        self.isometry().rotation.euler_angles().2
+    }
+
     /// The same as an nalgebra isometry.
     pub fn isometry(&self) -> Isometry3<f64> {
         let [x, y, z, w] = self.quaternion_xyzw;

@@ -58,13 +58,13 @@ impl SettingsArgs {
     /// [`Error::Usage`] when neither task nor pipeline file is given; see [`Pipeline::load`].
     pub fn resolve(&self, flags: &[Flag]) -> Result<Pipeline> {
         let refuse = |why: String| Error::Usage(format!("--task: {why}"));
-        let task = self.task.as_deref().map(ChosenTask::read).transpose().map_err(refuse)?;
-        let source = match (&self.pipeline, task, &self.task) {
-            (Some(path), task, _) => Source::File(path.clone(), task),
+        let read = |said: &str| ChosenTask::read(said).map_err(refuse);
+        let source = match (&self.pipeline, self.task.as_deref()) {
+            (Some(path), said) => Source::File(path.clone(), said.map(read).transpose()?),
             // A task's file is a pipeline file.
-            (None, Some(_), Some(said)) if self.preset.is_none() && config::is_file(said) => Source::File(said.into(), None),
-            (None, Some(task), _) => Source::BuiltIn(task, self.preset.unwrap_or_default()),
-            (None, None, _) => {
+            (None, Some(said)) if self.preset.is_none() && config::is_file(said) => Source::File(said.into(), None),
+            (None, Some(said)) => Source::BuiltIn(read(said)?, self.preset.unwrap_or_default()),
+            (None, None) => {
                 let tasks = built_in::names().join(", ");
                 return Err(Error::Usage(format!("which task? give --task ({tasks}, or a file) or --pipeline FILE")));
             }

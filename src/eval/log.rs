@@ -32,7 +32,7 @@ pub fn to_table(task: &Task, trials: &[Trial]) -> Table {
         add("x_m", "Place along x", |o| o.pose.position_m[0]);
         add("y_m", "Place along y", |o| o.pose.position_m[1]);
         if k < task.moved() {
-            add("yaw_rad", "Turn about the vertical", |o| o.pose.isometry().rotation.euler_angles().2);
+            add("yaw_rad", "Turn about the vertical", |o| o.pose.yaw_rad());
             add("friction", "Coulomb friction", |o| o.friction);
             add("mass_kg", "Mass", |o| o.mass_kg);
         }

@@ -5,7 +5,7 @@ use crate::joints::Joints;
 use crate::robot::Robot;
 use crate::robot::collision::Solid;
 use crate::scene::Scene;
-use crate::task::{Object, Target};
+use crate::task::Object;
 use nalgebra::Translation3;
 use std::f64::consts::FRAC_PI_2;
 
@@ -42,20 +42,19 @@ pub(super) fn grasps(scene: &Scene, goal: usize) -> Vec<Knot> {
     let number = scene.task.goals[goal].object;
     let pose = scene.objects[number].pose;
     let [x, y, z] = pose.position_m;
-    let yaw = quarter_turn(pose.isometry().rotation.euler_angles().2);
+    let yaw = quarter_turn(pose.yaw_rad());
     QUARTER_TURNS.map(|k| knot([x, y, z + scene.task.objects[number].grip_m], yaw + k * FRAC_PI_2)).to_vec()
 }
 
 /// How much higher than in its grasp an object is in the end of a lift \[m\].
 pub(super) fn lift_m(scene: &Scene, goal: usize) -> f64 {
-    let Target::Lift { height_m } = scene.task.goals[goal].target else { return 0.0 };
-    height_m + OVER_HEIGHT_M - scene.objects[scene.task.goals[goal].object].pose.position_m[2]
+    scene.target_m(goal)[2] + OVER_HEIGHT_M - scene.objects[scene.task.goals[goal].object].pose.position_m[2]
 }
 
 /// Level hand poses that let the object of a goal, held at `grasp`, stand at its target: least turning first.
 pub(super) fn releases(scene: &Scene, goal: usize, grasp: &Knot) -> Vec<Knot> {
     let number = scene.task.goals[goal].object;
-    let own = scene.objects[number].pose.isometry().rotation.euler_angles().2;
+    let own = scene.objects[number].pose.yaw_rad();
     let aligned = quarter_turn(scene.task.goals[goal].kind().yaw_rad(scene, goal) - own);
     let [x, y, z] = scene.target_m(goal);
     let yaw = grasp.w / YAW_LEVER_M + aligned;

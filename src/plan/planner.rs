@@ -52,7 +52,7 @@ impl Planner {
         let (mut at, mut from) = (ready(&self.motions.robot), self.motions.robot.ready);
         for goal in 0..scene.task.goals.len() {
             let world = World::new(scene, goal);
-            let (of_goal, end) = self.reach_goal(&world, (goal, at, from), rng)?;
+            let (of_goal, end) = self.reach_goal(&world, (at, from), rng)?;
             from = end_of(&of_goal);
             at = end;
             pieces.extend(of_goal.into_iter().map(|piece| (goal, piece)));
@@ -64,13 +64,13 @@ impl Planner {
     fn reach_goal(
         &mut self,
         world: &World,
-        (goal, from, start): (usize, Knot, Joints),
+        (from, start): (Knot, Joints),
         rng: &mut impl Rng,
     ) -> Result<(Vec<Piece>, Knot), PlanError> {
         let mut farthest: Option<PlanError> = None;
         for margin_m in PATH_CLEARANCES_M {
-            for grasp in grasps(world.scene, goal) {
-                match self.with_grasp(&Try { world, goal, from, start, grasp, margin_m }, rng) {
+            for grasp in grasps(world.scene, world.goal) {
+                match self.with_grasp(&Try { world, from, start, grasp, margin_m }, rng) {
                     Ok(found) => return Ok(found),
                     Err(error) if farthest.as_ref().is_none_or(|f| error.progress() > f.progress()) => farthest = Some(error),
                     Err(_) => {}
@@ -88,14 +88,14 @@ impl Planner {
 
     /// The whole way to a goal with one grasp and the first release that works.
     fn with_grasp(&mut self, with: &Try, rng: &mut impl Rng) -> Result<(Vec<Piece>, Knot), PlanError> {
-        let scene = with.world.scene;
+        let (scene, goal) = (with.world.scene, with.world.goal);
         let approach = self.approach(with, rng)?;
-        if !scene.task.goals[with.goal].kind().releases() {
-            let lifted = raised(&with.grasp, lift_m(scene, with.goal));
+        if !scene.task.goals[goal].kind().releases() {
+            let lifted = raised(&with.grasp, lift_m(scene, goal));
             return Ok((self.lift(with, lifted, approach, rng)?, lifted));
         }
         let mut first = None;
-        for release in releases(scene, with.goal, &with.grasp) {
+        for release in releases(scene, goal, &with.grasp) {
             match self.carry(with, &release, approach.clone(), rng) {
                 Ok(pieces) => return Ok((pieces, raised(&release, RETREAT_RISE_M))),
                 Err(error) => first = first.or(Some(error)),
@@ -108,7 +108,7 @@ impl Planner {
     fn approach(&mut self, with: &Try, rng: &mut impl Rng) -> Result<Vec<Piece>, PlanError> {
         let (standing, grasp) = (Moved::Free(with.pose()), with.grasp);
         let above = raised(&grasp, PREGRASP_RISE_M);
-        let name = &with.object().name;
+        let name = &with.world.object().name;
         let q_above = self.motions.reach(&above, &with.start, &format!("above the {name}"))?;
         let q = self.motions.reach(&grasp, &q_above, &format!("at the {name}"))?;
         with.world
@@ -125,7 +125,7 @@ impl Planner {
             start: with.start,
         };
         let q = self.motions.transit(with.world, &leg, rng)?;
-        let closing = self.fingers(Phase::Close, self.closing[with.number()].iter(), &q[q.len() - 1]);
+        let closing = self.fingers(Phase::Close, self.closing[with.world.number()].iter(), &q[q.len() - 1]);
         Ok(vec![Piece { phase: Phase::Approach, q }, closing])
     }
 
@@ -144,7 +144,7 @@ impl Planner {
         let q_above = self.motions.reach(&to, &start, "above the target")?;
         let mut q = self.motions.reach(release, &q_above, "at the target")?;
         let placed = Moved::Free(tool_pose(release) * with.in_tool());
-        let name = &with.object().name;
+        let name = &with.world.object().name;
         let at_target = |why| PlanError::Grasp(format!("with the {name} at its target, {why}"));
         with.world.check(&q, &held, with.margin_m).map_err(at_target)?;
         let robot = &self.motions.robot;
@@ -153,7 +153,7 @@ impl Planner {
         let (before, after) = (vec![grasp], vec![*release]);
         let leg = Leg { phase: Phase::Carry, before, from, to, after, moved: held, margin_m: with.margin_m, start };
         pieces.push(Piece { phase: Phase::Carry, q: self.motions.transit(with.world, &leg, rng)? });
-        pieces.push(self.fingers(Phase::Open, self.closing[with.number()].iter().rev(), &end_of(&pieces)));
+        pieces.push(self.fingers(Phase::Open, self.closing[with.world.number()].iter().rev(), &end_of(&pieces)));
         let leg = with.straight_up(Phase::Retreat, *release, raised(release, RETREAT_RISE_M), placed, end_of(&pieces));
         pieces.push(Piece { phase: Phase::Retreat, q: self.motions.transit(with.world, &leg, rng)? });
         Ok(pieces)
@@ -179,7 +179,6 @@ fn closing(robot: &Robot, object: &Object, limits: &Limits, interrupt: &Interrup
 /// One attempt at a goal: where the hand comes from, a grasp, and the distance to keep.
 struct Try<'a> {
     world: &'a World<'a>,
-    goal: usize,
     from: Knot,
     start: Joints,
     grasp: Knot,
@@ -187,18 +186,9 @@ struct Try<'a> {
 }
 
 impl Try<'_> {
-    /// The object that is moved, by its place in the task.
-    fn number(&self) -> usize {
-        self.world.scene.task.goals[self.goal].object
-    }
-
-    fn object(&self) -> &Object {
-        &self.world.scene.task.objects[self.number()]
-    }
-
-    /// Where it stands.
+    /// Where the object stands.
     fn pose(&self) -> Isometry3<f64> {
-        self.world.scene.objects[self.number()].pose.isometry()
+        self.world.scene.objects[self.world.number()].pose.isometry()
     }
 
     /// The held object's pose relative to the tool.

@@ -6,9 +6,8 @@ use crate::joints::Joints;
 use crate::robot::Robot;
 use crate::robot::collision::Solid;
 use crate::scene::{Obstacle, Scene};
-use crate::task::Target;
+use crate::task::{Object, Target};
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
-use std::sync::Arc;
 
 /// Least distance of arm and carried object to anything fixed, in a finished plan \[m\].
 pub const CLEARANCE_M: f64 = 0.01;
@@ -68,16 +67,12 @@ pub fn check_ready_pose(robot: &Robot, settings: &SceneSettings) -> Result<()> {
 #[derive(Clone, Debug)]
 pub(super) struct World<'a> {
     pub(super) scene: &'a Scene,
-    robot: Arc<Robot>,
+    pub(super) goal: usize,
     obstacles: Vec<Solid>,
     /// Other objects than the one that is moved, with their names.
-    others: Vec<(String, Solid)>,
+    others: Vec<(&'a str, Solid)>,
     /// What the object is put on, or into, with its name.
-    support: Option<(String, Vec<Solid>)>,
-    /// The moved object's name.
-    name: String,
-    /// Half of its edges \[m\].
-    half_m: [f64; 3],
+    support: Option<(&'a str, Vec<Solid>)>,
     /// Where the tool releases the object, or the object's centre if that is higher \[m\].
     release_m: Vector3<f64>,
 }
@@ -105,13 +100,22 @@ impl<'a> World<'a> {
             let boxes = task.objects[other].shape.boxes_m();
             boxes.into_iter().map(|(center, half_m)| Solid::cuboid(at * Translation3::from(center), half_m)).collect()
         };
-        let name = |other: usize| task.objects[other].name.clone();
+        let name = |other: usize| task.objects[other].name.as_str();
         let others = (0..task.objects.len()).filter(|other| *other != number && Some(*other) != supports);
         let others = others.flat_map(|other| solids(other).into_iter().map(move |solid| (name(other), solid))).collect();
         let support = supports.map(|other| (name(other), solids(other)));
         let release_m = Vector3::from(scene.target_m(goal)) + Vector3::z() * task.objects[number].held_m();
-        let half_m = task.objects[number].shape.half_m();
-        World { scene, robot: Arc::clone(&scene.robot), obstacles, others, support, name: name(number), half_m, release_m }
+        World { scene, goal, obstacles, others, support, release_m }
+    }
+
+    /// The object that is moved, by its place in the task.
+    pub(super) fn number(&self) -> usize {
+        self.scene.task.goals[self.goal].object
+    }
+
+    /// The object that is moved.
+    pub(super) fn object(&self) -> &'a Object {
+        &self.scene.task.objects[self.number()]
     }
 
     /// Whether anything stands there that a straight way could meet.
@@ -124,13 +128,13 @@ impl<'a> World<'a> {
     /// # Errors
     /// Names what comes too near to what.
     pub(super) fn check(&self, q: &Joints, moved: &Moved, margin_m: f64) -> Free {
-        self.check_poses(&self.robot.link_poses(q), moved, margin_m)
+        self.check_poses(&self.scene.robot.link_poses(q), moved, margin_m)
     }
 
     /// The same along the straight joint path between two configurations, at [`RESOLUTION_M`]; the first one is not checked.
     pub(super) fn check_motion(&self, from: &Joints, to: &Joints, moved: &Moved, margin_m: f64) -> Free {
-        let end = self.robot.link_poses(to);
-        let steps = (self.travel_m(&self.robot.link_poses(from), &end) / RESOLUTION_M).ceil().max(1.0) as usize;
+        let end = self.scene.robot.link_poses(to);
+        let steps = (self.travel_m(&self.scene.robot.link_poses(from), &end) / RESOLUTION_M).ceil().max(1.0) as usize;
         for k in 1..steps {
             let t = k as f64 / steps as f64;
             let q = Joints::from_fn(from.len(), |i| from[i] + t * (to[i] - from[i]));
@@ -140,12 +144,13 @@ impl<'a> World<'a> {
     }
 
     fn check_poses(&self, poses: &[Isometry3<f64>], moved: &Moved, margin_m: f64) -> Free {
-        let links = self.robot.solids(poses);
-        let tool = self.robot.tool_of(poses);
+        let links = self.scene.robot.solids(poses);
+        let tool = self.scene.robot.tool_of(poses);
         let at_release = self.at_release(&tool);
+        let moving = self.object();
         for (link, solid) in &links {
-            let name = &self.robot.links[*link].name;
-            let (hand, finger) = (*link >= self.robot.hand(), *link > self.robot.hand());
+            let name = &self.scene.robot.links[*link].name;
+            let (hand, finger) = (*link >= self.scene.robot.hand(), *link > self.scene.robot.hand());
             let table = if hand { HAND_TABLE_M } else { margin_m };
             if *link > 0 && solid.lowest_m() < table {
                 return Err(format!("{name} comes within {:.0} mm of the table", table * 1e3));
@@ -153,14 +158,14 @@ impl<'a> World<'a> {
             let base_margin = if finger && at_release { HAND_TABLE_M } else { margin_m };
             self.check_fixed(solid, name, margin_m, base_margin)?;
             if let (true, Moved::Free(pose)) = (hand, moved)
-                && !solid.farther_than(&Solid::cuboid(*pose, self.half_m), HAND_OBJECT_M)
+                && !solid.farther_than(&Solid::cuboid(*pose, moving.shape.half_m()), HAND_OBJECT_M)
             {
-                return Err(format!("{name} would push the {}", self.name));
+                return Err(format!("{name} would push the {}", moving.name));
             }
         }
         if let Moved::Held(in_tool) = moved {
-            let carried = Solid::cuboid(tool * in_tool, self.half_m);
-            let name = format!("the carried {}", self.name);
+            let carried = Solid::cuboid(tool * in_tool, moving.shape.half_m());
+            let name = format!("the carried {}", moving.name);
             if carried.lowest_m() < -SUPPORT_SLACK_M {
                 return Err(format!("{name} is pressed into the table"));
             }
@@ -192,8 +197,9 @@ impl<'a> World<'a> {
 
     /// Coarse: what the last three joints of the arm move, and the fingers, against what stands before the first three of those.
     fn check_self(&self, links: &[(usize, Solid)]) -> Free {
-        let name = |link: &usize| &self.robot.links[*link].name;
-        let [outer_from, inner_to] = [self.robot.arm.saturating_sub(WRIST - 1), self.robot.arm.saturating_sub(WRIST + 1)];
+        let name = |link: &usize| &self.scene.robot.links[*link].name;
+        let [outer_from, inner_to] =
+            [self.scene.robot.arm.saturating_sub(WRIST - 1), self.scene.robot.arm.saturating_sub(WRIST + 1)];
         for (outer, a) in links.iter().filter(|(link, _)| *link >= outer_from) {
             for (inner, b) in links.iter().filter(|(link, _)| *link <= inner_to && *link < outer_from) {
                 if !a.farther_than(b, SELF_M) {
@@ -207,7 +213,7 @@ impl<'a> World<'a> {
     /// The farthest that elbow, wrist, hand or fingertip move between two configurations \[m\].
     fn travel_m(&self, a: &[Isometry3<f64>], b: &[Isometry3<f64>]) -> f64 {
         let origins = a.iter().zip(b).map(|(a, b)| (a.translation.vector - b.translation.vector).norm());
-        let [of_a, of_b] = [a, b].map(|poses| self.robot.tool_of(poses).translation.vector);
+        let [of_a, of_b] = [a, b].map(|poses| self.scene.robot.tool_of(poses).translation.vector);
         origins.fold((of_a - of_b).norm(), f64::max)
     }
 }

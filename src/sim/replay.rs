@@ -9,10 +9,9 @@ use crate::interrupt::Interrupt;
 use crate::joints::Joints;
 use crate::pulse::Pulse;
 use crate::robot::Robot;
-use crate::scene::{Placed, Scene};
 use crate::seed::stream;
-use crate::state::{Action, Pose, State};
-use crate::tasks::{Observation, Task, bodies};
+use crate::state::{Action, State};
+use crate::tasks::{Observation, Task, scene_of};
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 use std::sync::Arc;
@@ -67,15 +66,7 @@ pub fn reexecute(
     interrupt: &Interrupt,
 ) -> Result<Episode> {
     let start = State::from_row(task, robot.joints.len(), demo.state(0)).expect("a demo of the task has rows of its length");
-    let bodies = bodies(task, scene, &mut rng);
-    let placed = |(pose, [friction, mass_kg]): (Pose, [f64; 2])| Placed { pose, friction, mass_kg };
-    let scene = Scene {
-        robot: Arc::clone(robot),
-        task: Arc::clone(task),
-        objects: start.objects.into_iter().zip(bodies).map(placed).collect(),
-        goals: start.goals,
-        obstacles: scene.obstacles.clone(),
-    };
+    let scene = scene_of((robot, task), scene, (start.objects, start.goals), &mut rng);
     let excitation = || {
         let rng = stream(rng.random(), "reexecute.fingers", index);
         Excitation { settings: fingers, rng, pulse: Pulse::new(robot.fingers().len()) }

@@ -51,6 +51,7 @@ impl World {
         World::at(scene, &scene.start(), settings)
     }
 
+    /// The objects stand where the scene has them, the arm moves as in the state.
     fn at(scene: &Scene, state: &State, settings: Physics) -> World {
         let mut physics = PhysicsWorld::new();
         physics.integration_parameters = IntegrationParameters { dt: 0.0, ..settings.parameters(settings.near) };
@@ -59,9 +60,8 @@ impl World {
         for obstacle in &scene.obstacles {
             insert_fixed(&mut physics, Owner::Obstacle, obstacle.center_m, obstacle.size_m.map(|s| s / 2.0));
         }
-        let placed = scene.objects.iter().zip(&state.objects).map(|(object, pose)| Placed { pose: *pose, ..*object });
-        let objects = scene.task.objects.iter().zip(placed).enumerate();
-        let objects = objects.map(|(i, (object, placed))| insert_object(&mut physics, i, &object.shape, &placed)).collect();
+        let objects = scene.task.objects.iter().zip(&scene.objects).enumerate();
+        let objects = objects.map(|(i, (object, placed))| insert_object(&mut physics, i, &object.shape, placed)).collect();
         let handle = arm::insert(&mut physics, &scene.robot, &state.q, &state.dq);
         // A step of no duration finds the contacts and moves nothing.
         physics.step();
@@ -124,11 +124,7 @@ impl World {
     /// that no goal moves stand where the state has them, and contacts start without force: in the middle of a grasp the future
     /// differs from the recorded one by about half a millimetre.
     pub fn set_state(&mut self, state: &State) {
-        let placed = self.scene.at(state).objects;
-        let mut scene = Scene { goals: state.goals.clone(), ..self.scene.clone() };
-        let moved = scene.task.moved();
-        scene.objects[moved..].copy_from_slice(&placed[moved..]);
-        *self = World::at(&scene, state, self.settings);
+        *self = World::at(&self.scene.at(state), state, self.settings);
     }
 
     /// Everything that the future depends on, as bytes.
@@ -193,9 +189,9 @@ fn insert_object(physics: &mut PhysicsWorld, number: usize, shape: &Shape, at: &
         }
         Shape::Cylinder { radius_m, height_m } => {
             let (r, h, side) = (radius_m, height_m, 2.0 * FRAC_PI_2 / f64::from(CYLINDER_SIDES));
-            let across =
-                vector([mass_kg * (3.0 * r * r + h * h) / 12.0, mass_kg * (3.0 * r * r + h * h) / 12.0, mass_kg * r * r / 2.0]);
-            physics.bodies[body].set_additional_mass_properties(MassProperties::new(Vector::ZERO, mass, across), true);
+            let across = mass_kg * (3.0 * r * r + h * h) / 12.0;
+            let inertia = vector([across, across, mass_kg * r * r / 2.0]);
+            physics.bodies[body].set_additional_mass_properties(MassProperties::new(Vector::ZERO, mass, inertia), true);
             for k in 0..CYLINDER_SIDES / 2 {
                 let turn = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), 2.0 * side * f64::from(k));
                 let at = isometry(&Isometry3::from_parts(Translation3::identity(), turn));
@@ -211,4 +207,30 @@ fn insert_object(physics: &mut PhysicsWorld, number: usize, shape: &Shape, at: &
         }
     }
     body
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::config::SceneSettings;
+    use crate::robot::file::built_in::paper_robot;
+    use crate::task::built_in::{find, pick_up};
+    use crate::tasks::draw_scene;
+
+    #[test]
+    fn the_table_carries_the_weight_of_the_block() {
+        let settings = SceneSettings::default();
+        // Of a cube, and of a can, which is made of several parts.
+        for task in [pick_up(), find("bin").expect("a task")] {
+            let scene =
+                draw_scene(&paper_robot(), &task, &settings, &mut crate::seed::stream(0, "weight", 0)).expect("there is room");
+            let mut world = World::new(&scene);
+            (0..20).for_each(|_| world.step(&[0.0; 9].into()));
+            let parts = world.physics.bodies[world.objects[0]].colliders();
+            let pairs = parts.iter().flat_map(|part| world.physics.contact_pairs_with(*part));
+            let force: f64 = pairs.map(|pair| contacts::force_n(pair, &world.physics)).sum();
+            let weight = scene.objects[0].mass_kg * f64::from(GRAVITY_M_S2);
+            assert!((force - weight).abs() < 0.02 * weight, "{task}: the table pushes with {force} N against {weight} N");
+        }
+    }
 }

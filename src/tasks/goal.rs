@@ -26,7 +26,7 @@ pub trait Kind {
 
     /// How the object is turned about the vertical then, but for quarter turns \[rad\].
     fn yaw_rad(&self, scene: &Scene, goal: usize) -> f64 {
-        super::yaw_of(&scene.objects[scene.task.goals[goal].object].pose)
+        scene.objects[scene.task.goals[goal].object].pose.yaw_rad()
     }
 
     /// Height of the object's centre that counts as lifted \[m\].

@@ -21,10 +21,9 @@ pub use observation::Observation;
 pub use on::ALIGNED_M;
 pub use place::MIN_TRAVEL_M;
 pub use reward::dense;
-pub use spawn::{bodies, draw_scene};
+pub use spawn::{draw_scene, scene_of};
 
 use crate::scene::Scene;
-use crate::state::Pose;
 
 /// Conditions of every goal before those of its kind.
 const ON_THE_WAY: [&str; 3] = ["reached", "grasped", "lifted"];
@@ -55,9 +54,4 @@ impl Scene {
             None => self.objects[object].pose.position_m,
         }
     }
-}
-
-/// Turn about the vertical \[rad\].
-fn yaw_of(pose: &Pose) -> f64 {
-    pose.isometry().rotation.euler_angles().2
 }

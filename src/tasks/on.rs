@@ -2,7 +2,6 @@
 
 use super::Observation;
 use super::goal::{Kind, PAID_LIFTED, PAID_THERE};
-use super::yaw_of;
 use crate::math::hypot;
 use crate::scene::Scene;
 use crate::task::Target;
@@ -54,7 +53,7 @@ impl Kind for OnTop {
         let other = support(scene, goal);
         match scene.task.goal_of(other) {
             Some(before) => scene.task.goals[before].kind().yaw_rad(scene, before),
-            None => yaw_of(&scene.objects[other].pose),
+            None => scene.objects[other].pose.yaw_rad(),
         }
     }
 

@@ -8,7 +8,7 @@ use crate::math::hypot;
 use crate::robot::Robot;
 use crate::scene::{Obstacle, Placed, Scene};
 use crate::state::Pose;
-use crate::task::{Area, Goal, Place, Spread, Target};
+use crate::task::{Area, Goal, Object, Place, Spread, Target};
 use rand::{Rng, RngExt};
 use std::sync::Arc;
 
@@ -32,26 +32,29 @@ pub fn draw_scene(robot: &Arc<Robot>, task: &Arc<Task>, settings: &SceneSettings
         };
         let goals: Vec<[f64; 3]> = task.goals.iter().filter_map(goal).collect();
         if fits(robot, task, &settings.obstacles, &poses, &goals) {
-            let bodies = bodies(task, settings, rng);
-            let place = |(pose, [friction, mass_kg]): (Pose, [f64; 2])| Placed { pose, friction, mass_kg };
-            return Ok(Scene {
-                robot: Arc::clone(robot),
-                task: Arc::clone(task),
-                objects: poses.into_iter().zip(bodies).map(place).collect(),
-                goals,
-                obstacles: settings.obstacles.clone(),
-            });
+            return Ok(scene_of((robot, task), settings, (poses, goals), rng));
         }
     }
     Err(no_room(robot, task, settings))
 }
 
-/// Friction and mass \[kg\] of each object in one episode.
-pub fn bodies(task: &Task, settings: &SceneSettings, rng: &mut impl Rng) -> Vec<[f64; 2]> {
+/// The scene in which objects and goals are there; frictions and masses are drawn.
+pub fn scene_of(
+    (robot, task): (&Arc<Robot>, &Arc<Task>),
+    settings: &SceneSettings,
+    (poses, goals): (Vec<Pose>, Vec<[f64; 3]>),
+    rng: &mut impl Rng,
+) -> Scene {
     // One number for all that have none of their own.
-    let common = [settings.friction, settings.block_mass_kg].map(|spread| spread.draw(rng));
-    let own = |spread: Option<Spread>, common: f64, rng: &mut _| spread.map_or(common, |spread| spread.draw(rng));
-    task.objects.iter().map(|o| [own(o.friction, common[0], rng), own(o.mass_kg, common[1], rng)]).collect()
+    let [friction, mass_kg] = [settings.friction, settings.block_mass_kg].map(|spread| spread.draw(rng));
+    let mut own = |spread: Option<Spread>, common: f64| spread.map_or(common, |spread| spread.draw(rng));
+    let placed = |(object, pose): (&Object, Pose)| Placed {
+        pose,
+        friction: own(object.friction, friction),
+        mass_kg: own(object.mass_kg, mass_kg),
+    };
+    let objects = task.objects.iter().zip(poses).map(placed).collect();
+    Scene { robot: Arc::clone(robot), task: Arc::clone(task), objects, goals, obstacles: settings.obstacles.clone() }
 }
 
 /// Whether what is to be moved is within reach, and everything clear of everything.
