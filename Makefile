@@ -119,7 +119,7 @@ POLICY     := $(DIR)/policy$(OF).safetensors
 EVALUATION := $(DIR)/evaluation$(OF).json
 ARTEFACTS  := $(PLANS) $(RECORDINGS) $(DATASET) $(DYNAMICS) $(POLICY) $(EVALUATION)
 
-.PHONY: all stages smoke experiment table2 table3 figures report test cluster-test check interop report-test qemu bench fuzz help clean-runs build need-cargo FORCE $(ARTEFACTS)
+.PHONY: all stages smoke experiment table2 table3 figures report test cluster-test check transfer interop report-test qemu bench fuzz help clean-runs build need-cargo FORCE $(ARTEFACTS)
 
 all: $(EVALUATION) ## run every stage of TASK; writes RUNS/TASK/policy.safetensors and RUNS/TASK/evaluation.json
 	@$(MADE) result
@@ -252,6 +252,11 @@ check: need-cargo ## what CI runs: format, lints, documentation, tests
 
 cluster-test: build ## a tiny experiment through Snakemake and through Slurm on this machine, the bytes of a plain run (needs root, installs both)
 	tests/cluster/run.sh $(HILT)
+
+transfer: ## the policy of TASK on DeepMind's Jaco in MuJoCo, EPISODES of them (500): RUNS/TASK/transfer (needs Python 3.11; docs/transfer.md)
+	@:$(if $(filter-out $(PAPER_TASKS),$(TASK))$(filter-out jaco,$(ROBOT)),$(error make transfer knows the tasks $(PAPER_TASKS) on the jaco, not TASK=$(TASK) ROBOT=$(ROBOT)))
+	@$(MAKE) --no-print-directory all
+	python/transfer/run.sh $(HILT) $(POLICY) $(EVALUATION:.json=.episodes.parquet) $(DIR)/transfer$(OF) $(or $(EPISODES),500) $(call word-of,$(basename $(notdir $(PIPELINE)))$(OF))
 
 interop: build ## tiny runs of all tasks, read by mcap, pyarrow, DuckDB, pandas, LeRobot and safetensors (needs Python 3.12)
 	for task in $(TASKS); do $(MAKE) --no-print-directory all TASK=$$task RUNS=$(RUNS)/smoke SET="$(SMOKE)"; done

@@ -43,6 +43,8 @@ pub struct Scene {
     pub goals: Vec<[f64; 3]>,
     /// Fixed boxes to keep clear of.
     pub obstacles: Vec<Obstacle>,
+    /// Dry friction of the fingers' joints, in units of the robot's own.
+    pub finger_friction: f64,
 }
 
 /// What stands beside every plan as JSON: whoever reads that says whose plans they are, and of which task.
@@ -52,6 +54,17 @@ struct SceneFile {
     objects: Vec<Placed>,
     goals: Vec<[f64; 3]>,
     obstacles: Vec<Obstacle>,
+    #[serde(default = "as_it_is", skip_serializing_if = "is_as_it_is")]
+    finger_friction: f64,
+}
+
+/// Fingers as the robot's file has them, which is not written down.
+fn as_it_is() -> f64 {
+    1.0
+}
+
+fn is_as_it_is(share: &f64) -> bool {
+    *share == as_it_is()
 }
 
 /// The same in files from when there were one block, and a goal or a base block.
@@ -84,8 +97,8 @@ const OLDER_BASE_FRICTION: f64 = 1.0;
 impl Scene {
     /// Everything but robot and task.
     pub fn to_json(&self) -> Value {
-        let Scene { objects, goals, obstacles, .. } = self.clone();
-        serde_json::to_value(SceneFile { objects, goals, obstacles }).expect("a scene is plain data with text keys")
+        let Scene { objects, goals, obstacles, finger_friction, .. } = self.clone();
+        serde_json::to_value(SceneFile { objects, goals, obstacles, finger_friction }).expect("a scene is plain data with text keys")
     }
 
     /// The inverse of [`Scene::to_json`], also of files from when there were one block, and a goal or a base block.
@@ -102,8 +115,8 @@ impl Scene {
             let (friction, mass_kg) = (older.friction, older.block_mass_kg);
             return Ok(Scene::of_older(robot, task, (older.block, older.context), (friction, mass_kg), older.obstacles));
         }
-        let SceneFile { objects, goals, obstacles } = serde_json::from_value(value).map_err(|e| e.to_string())?;
-        Ok(Scene { robot: Arc::clone(robot), task: Arc::clone(task), objects, goals, obstacles })
+        let SceneFile { objects, goals, obstacles, finger_friction } = serde_json::from_value(value).map_err(|e| e.to_string())?;
+        Ok(Scene { robot: Arc::clone(robot), task: Arc::clone(task), objects, goals, obstacles, finger_friction })
     }
 
     /// From when there were one block, and a goal or a base block.
@@ -119,7 +132,8 @@ impl Scene {
             objects.push(Placed { pose, friction: OLDER_BASE_FRICTION, mass_kg });
         }
         let goals = if let OlderContext::Goal(goal) = context { vec![goal] } else { Vec::new() };
-        Scene { robot: Arc::clone(robot), task: Arc::clone(task), objects, goals, obstacles }
+        let (robot, task) = (Arc::clone(robot), Arc::clone(task));
+        Scene { robot, task, objects, goals, obstacles, finger_friction: as_it_is() }
     }
 
     /// The state at the start: the arm at rest in its ready pose.

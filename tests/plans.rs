@@ -48,6 +48,7 @@ fn over_the_wall(index: u64, height_m: f64) -> Scene {
         objects: vec![Placed { pose: block, friction: 1.0, mass_kg: 0.1 }],
         goals: vec![goal],
         obstacles: vec![wall],
+        finger_friction: 1.0,
     }
 }
 

@@ -37,6 +37,7 @@ fn episode(task: &Arc<Task>, steps: usize) -> Episode {
         objects: vec![placed(block)],
         goals: Vec::new(),
         obstacles: Vec::new(),
+        finger_friction: 1.0,
     };
     if *task == pick_and_place() {
         scene.goals = vec![[0.40, 0.12, 0.025]];

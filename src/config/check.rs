@@ -2,7 +2,7 @@
 
 use super::ranges::MOST_OBSTACLES;
 use super::ranges::{RANGES, Range};
-use super::{Pipeline, SceneSettings};
+use super::Pipeline;
 use crate::error::{Error, Result};
 use crate::scene::Obstacle;
 use crate::task::{Spread, built_in};
@@ -42,11 +42,11 @@ pub(super) fn resolve(table: Table, origin: &str) -> Result<Pipeline> {
     if boxes > MOST_OBSTACLES {
         return Err(Error::Usage(format!("{origin}: scene.obstacles has {boxes} boxes; allowed: up to {MOST_OBSTACLES}")));
     }
-    all_ordered(&pipeline.scene, origin)?;
+    all_ordered(&pipeline, origin)?;
     Ok(pipeline)
 }
 
-fn all_ordered(scene: &SceneSettings, origin: &str) -> Result<()> {
+fn all_ordered(Pipeline { scene, simulate, .. }: &Pipeline, origin: &str) -> Result<()> {
     let areas = [
         ("scene.spawn_x_m", scene.spawn_x_m),
         ("scene.spawn_y_m", scene.spawn_y_m),
@@ -59,6 +59,8 @@ fn all_ordered(scene: &SceneSettings, origin: &str) -> Result<()> {
         ("scene.base_xy_m", base_y),
         ("scene.friction", scene.friction),
         ("scene.block_mass_kg", scene.block_mass_kg),
+        ("scene.finger_friction", scene.finger_friction),
+        ("simulate.delay_steps", simulate.delay_steps),
     ];
     let ranges = spreads.into_iter().filter_map(|(key, spread)| match spread {
         Spread::Fixed(_) => None,

@@ -39,6 +39,8 @@ pub(super) const MOST_OBSTACLES: usize = 100;
 /// Most control steps of an episode, and samples of a plan: 500 s. Keeps a slip of the finger from allocating all memory.
 pub const MOST_STEPS: u32 = 10_000;
 const STEPS: f64 = MOST_STEPS as f64;
+/// Longest delay of a command \[control steps\]: a second. No arm that takes longer is driven by joint velocities.
+const LONGEST_DELAY_STEPS: f64 = 20.0;
 /// Most hidden layers of a network.
 pub const MOST_LAYERS: u32 = 16;
 /// Most units of a hidden layer.
@@ -71,6 +73,7 @@ pub(super) const RANGES: &[Range] = &[
     within("scene.base_xy_m", -WORKSPACE_M, WORKSPACE_M),
     within("scene.friction", 0.0, 10.0),
     Range { least: Some(LIGHTEST), ..above("scene.block_mass_kg", 0.0, 10.0) },
+    within("scene.finger_friction", 0.0, 10.0),
     within("scene.obstacles.center_m", -WORKSPACE_M, WORKSPACE_M),
     above("scene.obstacles.size_m", 0.0, 2.0 * WORKSPACE_M),
     within("plan.episodes", 1.0, MOST_EPISODES),
@@ -79,6 +82,7 @@ pub(super) const RANGES: &[Range] = &[
     within("plan.search_iterations", 1.0, MOST_ITERATIONS),
     within("plan.shortcut_iterations", 0.0, MOST_ITERATIONS),
     within("simulate.noise_variance", 0.0, 1.0),
+    within("simulate.delay_steps", 0.0, LONGEST_DELAY_STEPS),
     within("simulate.max_steps", 1.0, STEPS),
     within("simulate.pulses.probability", 0.0, 1.0),
     within("simulate.pulses.steps", 1.0, STEPS),

@@ -30,6 +30,9 @@ pub struct SceneSettings {
     pub friction: Spread,
     /// Mass of an object \[kg\], a number or a range.
     pub block_mass_kg: Spread,
+    /// Dry friction of the fingers' joints in units of the robot's own, a number or a range: what keeps a thumb in its place while two fingers press
+    /// against it, and is known of hardly any hand.
+    pub finger_friction: Spread,
     /// Fixed boxes to keep clear of (`[[scene.obstacles]]`).
     pub obstacles: Vec<Obstacle>,
 }
@@ -45,6 +48,7 @@ impl Default for SceneSettings {
             base_xy_m: [Spread::Fixed(0.45), Spread::Fixed(0.30)],
             friction: Spread::Fixed(1.0),
             block_mass_kg: Spread::Fixed(0.1),
+            finger_friction: Spread::Fixed(1.0),
             obstacles: Vec::new(),
         }
     }
@@ -77,6 +81,7 @@ pub fn check_scene(scene: &Scene) -> Result<(), String> {
     if let Some((found, expected, what)) = counts.into_iter().find(|(found, expected, _)| found != expected) {
         return Err(format!("it has {found} {what}, {task} has {expected}"));
     }
+    number("scene.finger_friction", scene.finger_friction)?;
     for (object, placed) in task.objects.iter().zip(&scene.objects) {
         number("scene.friction", placed.friction)?;
         number("scene.block_mass_kg", placed.mass_kg)?;
@@ -165,6 +170,8 @@ impl Default for FingerPulses {
 pub struct SimulateSettings {
     /// Variance of the Gaussian noise on each of the nine commands, per control step \[(rad/s)^2\] (paper 4.1).
     pub noise_variance: f64,
+    /// Control steps after which a command acts, a number or a range of which every episode draws a whole one: what a real arm's bus and servos take.
+    pub delay_steps: Spread,
     /// Control steps after which an episode is given up.
     pub max_steps: u32,
     /// Disturbance pulses.
@@ -173,6 +180,6 @@ pub struct SimulateSettings {
 
 impl Default for SimulateSettings {
     fn default() -> Self {
-        SimulateSettings { noise_variance: 0.001, max_steps: 400, pulses: PulseSettings::default() }
+        SimulateSettings { noise_variance: 0.001, delay_steps: Spread::Fixed(0.0), max_steps: 400, pulses: PulseSettings::default() }
     }
 }

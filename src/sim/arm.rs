@@ -26,8 +26,15 @@ pub(super) fn axis(kind: JointKind) -> JointAxis {
     }
 }
 
-/// Adds the robot at joint state `q`, `dq`; returns the handle of its first joint (any joint's would do).
-pub(super) fn insert(physics: &mut PhysicsWorld, robot: &Robot, q: &[f64], dq: &[f64]) -> MultibodyJointHandle {
+/// Adds the robot at joint state `q`, `dq`, its fingers with so much of their dry friction; returns the handle of its first joint (any joint's
+/// would do).
+pub(super) fn insert(
+    physics: &mut PhysicsWorld,
+    robot: &Robot,
+    q: &[f64],
+    dq: &[f64],
+    finger_friction: f64,
+) -> MultibodyJointHandle {
     let links: Vec<RigidBodyHandle> = (0..robot.links.len()).map(|link| insert_link(physics, robot, link)).collect();
     let mut handles = robot.joints.iter().enumerate().map(|(i, joint)| {
         physics
@@ -45,7 +52,8 @@ pub(super) fn insert(physics: &mut PhysicsWorld, robot: &Robot, q: &[f64], dq: &
     for (i, (joint, velocity)) in robot.joints.iter().zip(dq).enumerate() {
         multibody.armature_mut()[i] = joint.motor.armature as Real;
         multibody.damping_mut()[i] = joint.motor.damping as Real;
-        multibody.frictions_mut()[i] = joint.motor.friction as Real;
+        let share = if i < robot.arm { 1.0 } else { finger_friction };
+        multibody.frictions_mut()[i] = (share * joint.motor.friction) as Real;
         multibody.generalized_velocity_mut()[i] = *velocity as Real;
     }
     multibody.apply_displacements(&q.iter().map(|v| *v as Real).collect::<Vec<_>>());
@@ -138,13 +146,14 @@ mod tests {
         for robot in all() {
             let mut physics = PhysicsWorld::new();
             let n = robot.joints.len();
-            let handle = insert(&mut physics, &robot, &robot.ready, &Joints::zeros(n));
+            let handle = insert(&mut physics, &robot, &robot.ready, &Joints::zeros(n), 0.5);
             let action = Joints::from_fn(n, |i| 0.01 * i as f64);
             command(&mut physics, &robot, handle, &action);
             physics.step();
             let multibody = physics.multibody_joints.get(handle).expect("inserted above").0;
             for (i, ours) in robot.joints.iter().enumerate() {
-                let expected = [ours.motor.armature, ours.motor.damping, ours.motor.friction].map(|v| v as Real);
+                let share = if i < robot.arm { 1.0 } else { 0.5 };
+                let expected = [ours.motor.armature, ours.motor.damping, share * ours.motor.friction].map(|v| v as Real);
                 let found = [multibody.armature()[i], multibody.damping()[i], multibody.frictions()[i]];
                 assert_eq!(found, expected, "{}", ours.name);
                 let joint = &multibody.link(i + 1).expect("a link").joint.data;
@@ -160,7 +169,7 @@ mod tests {
         for robot in all() {
             let mut physics = PhysicsWorld::new();
             let q = Joints::from_fn(robot.joints.len(), |i| robot.ready[i] + 0.2 * robot.joints[i].per_radian());
-            let handle = insert(&mut physics, &robot, &q, &Joints::zeros(q.len()));
+            let handle = insert(&mut physics, &robot, &q, &Joints::zeros(q.len()), 1.0);
             let multibody = physics.multibody_joints.get(handle).expect("inserted above").0;
             for (link, ours) in multibody.links().zip(robot.link_poses(&q)) {
                 let theirs = crate::sim::convert::to_pose(physics.bodies[link.rigid_body_handle()].position()).isometry();

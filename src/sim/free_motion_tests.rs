@@ -116,7 +116,7 @@ fn released(robot: &Robot, substep_s: f64, gravity: f64) -> (PhysicsWorld, Multi
     physics.gravity = Vector::new(0.0, 0.0, -gravity as Real);
     physics.integration_parameters.num_solver_iterations = 1;
     let [q, dq] = start(robot);
-    let handle = arm::insert(&mut physics, robot, q.as_slice(), dq.as_slice());
+    let handle = arm::insert(&mut physics, robot, q.as_slice(), dq.as_slice(), 1.0);
     // A step of no duration gives the bodies their masses.
     physics.integration_parameters.dt = 0.0;
     physics.step();

@@ -62,7 +62,7 @@ impl World {
         }
         let objects = scene.task.objects.iter().zip(&scene.objects).enumerate();
         let objects = objects.map(|(i, (object, placed))| insert_object(&mut physics, i, &object.shape, placed)).collect();
-        let handle = arm::insert(&mut physics, &scene.robot, &state.q, &state.dq);
+        let handle = arm::insert(&mut physics, &scene.robot, &state.q, &state.dq, scene.finger_friction);
         // A step of no duration finds the contacts and moves nothing.
         physics.step();
         physics.integration_parameters = settings.parameters(settings.near);

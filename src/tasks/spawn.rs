@@ -54,7 +54,8 @@ pub fn scene_of(
         mass_kg: own(object.mass_kg, mass_kg),
     };
     let objects = task.objects.iter().zip(poses).map(placed).collect();
-    Scene { robot: Arc::clone(robot), task: Arc::clone(task), objects, goals, obstacles: settings.obstacles.clone() }
+    let (obstacles, finger_friction) = (settings.obstacles.clone(), settings.finger_friction.draw(rng));
+    Scene { robot: Arc::clone(robot), task: Arc::clone(task), objects, goals, obstacles, finger_friction }
 }
 
 /// Whether what is to be moved is within reach, and everything clear of everything.

@@ -47,6 +47,7 @@ pub fn episode(task: &Arc<Task>, index: u64, steps: usize) -> Episode {
         objects: task.objects.iter().map(placed).collect(),
         goals: vec![[0.5, -0.1, 0.025]; task.goal_names().len()],
         obstacles: vec![Obstacle { center_m: [0.4, 0.1, 0.1], size_m: [0.02, 0.3, 0.2] }; index as usize % 2],
+        finger_friction: if index % 3 == 2 { 0.4 } else { 1.0 },
     };
     let steps: Vec<Step> = (0..steps).map(|t| step(&scene, t, &mut rng)).collect();
     let mut last = step(&scene, 0, &mut rng);

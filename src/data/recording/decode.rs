@@ -134,7 +134,8 @@ fn scene(robot: &Arc<Robot>, task: Option<&Arc<Task>>, message: proto::Scene) ->
                 return Err(format!("its scene has the objects {:?}, which are not those of {task}", names.collect::<Vec<_>>()));
             }
             let objects = message.objects.iter().map(placed).collect::<Result<_, String>>()?;
-            Scene { robot, task, objects, goals: points(&message.goals)?, obstacles }
+            let (goals, finger_friction) = (points(&message.goals)?, message.finger_friction.unwrap_or(1.0));
+            Scene { robot, task, objects, goals, obstacles, finger_friction }
         }
         None => older::scene(robot, &built_in::find(&message.task)?, &message, obstacles)?,
     };

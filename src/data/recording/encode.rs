@@ -37,6 +37,7 @@ pub(super) fn scene(scene: &Scene) -> proto::Scene {
         obstacles: scene.obstacles.iter().map(obstacle).collect(),
         objects: scene.task.objects.iter().zip(&scene.objects).map(placed).collect(),
         goals: scene.goals.iter().map(point).collect(),
+        finger_friction: (scene.finger_friction != 1.0).then_some(scene.finger_friction),
         ..proto::Scene::default()
     }
 }
