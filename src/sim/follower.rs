@@ -36,6 +36,8 @@ const CLOSE_Z_M: f64 = 0.004;
 const OPEN_XY_M: f64 = 0.008;
 /// ... and this little above it \[m\].
 const OPEN_Z_M: f64 = 0.004;
+/// ... or, once it stands on something, this little: a cube of 5 cm that leans by 20 degrees in the hand comes no lower than 7 mm \[m\].
+const LEANING_Z_M: f64 = 0.008;
 /// The way up from a released object ends for the next goal when so little of it is left \[m\]: there is nothing to be exact about.
 const RETREATED_M: f64 = 0.02;
 /// The grip is firm when the fingers move slower than this share of the speed with which they close.
@@ -169,7 +171,8 @@ impl Follower {
             }
             Phase::Carry => {
                 let object = Vector3::from(seen.at(course.object)) - course.astray_m(seen);
-                if course.release_m.is_some_and(|to| (object - to).xy().norm() < OPEN_XY_M && object.z - to.z < OPEN_Z_M) {
+                let least_m = if seen.touches(course.object) { LEANING_Z_M } else { OPEN_Z_M };
+                if course.release_m.is_some_and(|to| (object - to).xy().norm() < OPEN_XY_M && object.z - to.z < least_m) {
                     self.enter(Phase::Open);
                 }
             }

@@ -96,8 +96,7 @@ impl History {
         if gripped {
             self.lost_in_air = false;
         } else if self.was_gripped {
-            let touch = &seen.contacts.objects[number];
-            self.lost_in_air = !touch.table && touch.objects.is_empty();
+            self.lost_in_air = !seen.touches(number);
         }
         self.was_gripped = gripped;
 

@@ -42,6 +42,12 @@ impl Observation {
         self.contacts.objects[object].fingers_n.iter().all(|f| *f <= 0.0)
     }
 
+    /// Whether an object touches the table or another object.
+    pub fn touches(&self, object: usize) -> bool {
+        let touch = &self.contacts.objects[object];
+        touch.table || !touch.objects.is_empty()
+    }
+
     /// Whether two fingers that oppose each other press an object.
     pub fn gripped(&self, object: usize) -> bool {
         self.robot.grips(|finger| self.contacts.objects[object].fingers_n[finger] > PRESS_N)
