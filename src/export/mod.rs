@@ -1,0 +1,4 @@
+//! Policies for programs that are not hilt.
+
+mod features;
+pub mod onnx;
