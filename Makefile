@@ -253,9 +253,10 @@ check: need-cargo ## what CI runs: format, lints, documentation, tests
 cluster-test: build ## a tiny experiment through Snakemake and through Slurm on this machine, the bytes of a plain run (needs root, installs both)
 	tests/cluster/run.sh $(HILT)
 
-interop: build ## tiny runs of all tasks, read by mcap, pyarrow, DuckDB, pandas, LeRobot and safetensors (needs Python 3.12)
+interop: build ## tiny runs of all tasks, read by mcap, pyarrow, DuckDB, pandas, LeRobot, safetensors, ONNX (needs Python 3.12)
 	for task in $(TASKS); do $(MAKE) --no-print-directory all TASK=$$task RUNS=$(RUNS)/smoke SET="$(SMOKE)"; done
-	tests/interop/run.sh $(RUNS)/smoke
+	tests/interop/policies.sh $(HILT) $(RUNS)/smoke
+	tests/interop/run.sh $(RUNS)/smoke $(HILT)
 
 report-test: report ## open that page in headless Chromium: no network, no errors, every figure (needs Python 3; installs Playwright and Chromium)
 	tests/report/browser.sh $(RUNS)/report

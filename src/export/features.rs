@@ -1,5 +1,6 @@
 //! What a network sees of a state, as operators of a graph: the sums of [`crate::learn::models::Features`] in the same order, so that both round alike.
 
+use super::trigonometry::sin_cos;
 use crate::data::onnx::{Graph, Op, Value};
 use crate::layout::{Chain, Layout};
 use crate::learn::models::{Features, NEAR_M, Scaling};
@@ -62,10 +63,7 @@ fn hand(graph: &mut Graph, arm: &Chain, state: &str) -> Hand {
     let q = take(graph, state, "arm.q", &[joints], &(0..joints).collect::<Vec<_>>());
     let axis = graph.indices("parts", &[1], &[PARTS as usize]);
     let q = graph.apply(Op::Unsqueeze, &[&q, &axis], "arm.q.column");
-    let [sin, cos] = [(Op::Sin, "arm.sin"), (Op::Cos, "arm.cos")].map(|(op, name)| {
-        let value = graph.apply(op, &[&q], name);
-        graph.split(&value, ENTRIES, joints, name)
-    });
+    let [sin, cos] = sin_cos(graph, &q, "arm.q").map(|value| graph.split(&value, ENTRIES, joints, &value));
     let mut before: Option<([Value; 3], Value)> = None;
     for (i, frame) in arm.joints.iter().enumerate() {
         let name = format!("joint_{}", i + 1);

@@ -2,3 +2,4 @@
 
 mod features;
 pub mod onnx;
+mod trigonometry;

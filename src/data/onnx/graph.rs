@@ -19,10 +19,10 @@ pub enum Op {
     Mul,
     /// a / b.
     Div,
-    /// Sine.
-    Sin,
-    /// Cosine.
-    Cos,
+    /// To the nearest integer.
+    Round,
+    /// To the next integer below.
+    Floor,
     /// Hyperbolic tangent.
     Tanh,
     /// max(0, x).
@@ -48,8 +48,8 @@ impl Op {
             Op::Sub => "Sub",
             Op::Mul => "Mul",
             Op::Div => "Div",
-            Op::Sin => "Sin",
-            Op::Cos => "Cos",
+            Op::Round => "Round",
+            Op::Floor => "Floor",
             Op::Tanh => "Tanh",
             Op::Relu => "Relu",
             Op::Gemm => "Gemm",
@@ -136,7 +136,7 @@ impl Graph {
     /// Cuts a value into `parts` of equal size along `axis`; they are called `name.1` and so on.
     pub fn split(&mut self, value: &str, axis: i64, parts: usize, name: &str) -> Vec<Value> {
         let outputs: Vec<Value> = (1..=parts).map(|i| format!("{name}.{i}")).collect();
-        self.push(Op::Split(axis), &[value], name, outputs.clone());
+        self.push(Op::Split(axis), &[value], &format!("{name}.split"), outputs.clone());
         outputs
     }
 

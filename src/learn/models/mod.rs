@@ -16,7 +16,7 @@ mod weights;
 pub use corpus::{Corpus, row};
 pub use dynamics::{Dynamics, STEP_FLOOR};
 pub use features::{Features, NEAR_M, derived_width};
-pub use hand::Hand;
+pub use hand::{COS, HALF_PI, Hand, SIN, Series};
 pub use model_report::{ModelReport, error_table};
 pub use policy::Policy;
 pub use samples::{ModelSamples, PolicySamples, Samples};

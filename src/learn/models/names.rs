@@ -15,7 +15,8 @@ pub fn relation_names(layout: &Layout) -> Vec<String> {
         return Vec::new();
     }
     let of = |what: String, parts: [&str; 3]| parts.map(|part| format!("{what}.{part}"));
-    let hand = [("tool", POSITION), ("x_axis", VECTOR), ("y_axis", VECTOR)].map(|(what, parts)| of(format!("hand.{what}"), parts));
+    let hand =
+        [("tool", POSITION), ("x_axis", VECTOR), ("y_axis", VECTOR)].map(|(what, parts)| of(format!("hand.{what}"), parts));
     let in_hand = layout.objects().map(|(object, _)| of(format!("{object}.in_hand"), POSITION));
     let missing = layout.aims.iter().map(|aim| of(format!("{}.to_{}", aim.object, aim.target), POSITION));
     hand.into_iter().chain(in_hand).chain(missing).flatten().collect()
