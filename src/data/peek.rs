@@ -129,17 +129,18 @@ fn in_header(file: &mut File, size: u64, head: &[u8]) -> Result<Peeked> {
     })
 }
 
-/// Of a network for other programs, a protobuf: who wrote it, and whether its fields end where the file does.
+/// Of a network for other programs, a protobuf: who wrote it, and of our own whether its fields end where the file does.
 fn in_fields(file: &mut File, size: u64, head: &[u8]) -> Result<Peeked> {
     let named = |(length, name): (&u8, &[u8])| usize::from(*length) == PRODUCER.len() && name.starts_with(PRODUCER.as_bytes());
-    let ours = head.get(3..).and_then(<[u8]>::split_first).is_some_and(named);
+    if !head.get(3..).and_then(<[u8]>::split_first).is_some_and(named) {
+        return Ok(Peeked { format: Format::Onnx, stage: None, kind: None, whole: true });
+    }
     let mut at = 0;
     while at < size {
         let bytes = part(file, at, LONGEST_KEY)?;
         at = field_end(&bytes).and_then(|length| at.checked_add(length)).unwrap_or(u64::MAX);
     }
-    let stage = ours.then(|| EXPORT.to_string());
-    Ok(Peeked { format: Format::Onnx, stage, kind: None, whole: at == size })
+    Ok(Peeked { format: Format::Onnx, stage: Some(EXPORT.into()), kind: None, whole: at == size })
 }
 
 /// Bytes of the field that begins here, whose value is a number or has its length before it.

@@ -6,8 +6,8 @@ set -eu
 hilt=$1 runs=$2
 root=$(cd "$(dirname "$0")/../.." && pwd)
 tiny="train.warm_start_updates=50 train.epochs=1 train.min_updates=0 train.select_episodes=1"
-# Untrained policies do not end early: 40 episodes of 300 steps leave room for some that do.
-record="--episodes 40 --set evaluate.horizon_steps=300"
+# Policies that have learned little do not end early: 80 episodes of 300 steps leave room for some that do.
+episodes=80
 
 # policy NAME METHOD "FLAGS" "SETTINGS": demos and dynamics of RUNS/FROM, where the method has any.
 policy() {
@@ -20,7 +20,7 @@ policy() {
     echo "  $1"
     "$hilt" train $flags --quiet --method "$method" $learns --sets "$tiny $settings" --out "$out/policy.safetensors"
     "$hilt" export onnx "$out/policy.safetensors" --out "$out/policy.onnx" --quiet
-    "$hilt" evaluate $flags --quiet --policy "$out/policy.safetensors" $record --seed 1 --record "$out/rollouts" > /dev/null
+    "$hilt" evaluate $flags --quiet --policy "$out/policy.safetensors" --episodes $episodes --set evaluate.horizon_steps=300 --seed 1 --record "$out/rollouts" > /dev/null
 }
 
 echo "policies in $runs/policies"
@@ -36,7 +36,10 @@ policy stack-relu hil "--task stack" "train.activation=relu train.hidden_layers=
 from=$runs/pick-up
 ppo="train.ppo.total_steps=640 train.ppo.worlds=8 train.ppo.steps=16 train.ppo.horizon_steps=20"
 policy pick-up-ppo ppo "--task pick-up" "$ppo"
+# it solves the task, in some 90 steps
+episodes=120
 policy pick-up-bc-rl bc-rl "--task pick-up" "$ppo"
+episodes=80
 for robot in panda ur5e "$root/fixtures/robots/five.toml"; do
     name=$(basename "$robot" .toml)
     from=$runs/$name-stack flags="--task stack --robot $robot"

@@ -77,6 +77,8 @@ fn a_place_that_is_not_its_own_is_refused() {
     // as PyTorch begins its files
     let foreign = [&[0x08, 0x07, 0x12, 0x07][..], b"pytorch", &[0x1a, 0x03], b"2.0"].concat();
     fs::write(at("foreign.onnx"), &foreign).expect("written");
+    // one that was cut short is not ours to replace either
+    fs::write(at("cut.onnx"), &foreign[..6]).expect("written");
     fs::write(at("notes.onnx"), "years of work").expect("written");
     fs::create_dir(at("directory.onnx")).expect("made");
     let policy = fs::read(fixture()).expect("a policy");
@@ -85,6 +87,7 @@ fn a_place_that_is_not_its_own_is_refused() {
     let before = names(dir.path());
     for (name, code, said) in [
         ("foreign.onnx", 2, "holds a file that hilt did not write, which would be lost"),
+        ("cut.onnx", 2, "holds a file that hilt did not write, which would be lost"),
         ("notes.onnx", 2, "holds a file of another format, which would be lost"),
         ("policy.bin", 2, "its name must end in .onnx: "),
         ("policy.safetensors", 2, "its name must end in .onnx: "),

@@ -151,11 +151,6 @@ impl Graph {
         });
     }
 
-    /// Number of operators.
-    pub fn nodes(&self) -> usize {
-        self.proto.node.len()
-    }
-
     pub(super) fn into_proto(self) -> GraphProto {
         self.proto
     }
