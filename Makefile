@@ -258,9 +258,10 @@ transfer: ## the policy of TASK on DeepMind's Jaco in MuJoCo, EPISODES of them (
 	@$(MAKE) --no-print-directory all
 	python/transfer/run.sh $(HILT) $(POLICY) $(EVALUATION:.json=.episodes.parquet) $(DIR)/transfer$(OF) $(or $(EPISODES),500) $(call word-of,$(basename $(notdir $(PIPELINE)))$(OF))
 
-interop: build ## tiny runs of all tasks, read by mcap, pyarrow, DuckDB, pandas, LeRobot and safetensors (needs Python 3.12)
+interop: build ## tiny runs of all tasks, read by mcap, pyarrow, DuckDB, pandas, LeRobot, safetensors, ONNX (needs Python 3.12)
 	for task in $(TASKS); do $(MAKE) --no-print-directory all TASK=$$task RUNS=$(RUNS)/smoke SET="$(SMOKE)"; done
-	tests/interop/run.sh $(RUNS)/smoke
+	tests/interop/policies.sh $(HILT) $(RUNS)/smoke
+	tests/interop/run.sh $(RUNS)/smoke $(HILT)
 
 report-test: report ## open that page in headless Chromium: no network, no errors, every figure (needs Python 3; installs Playwright and Chromium)
 	tests/report/browser.sh $(RUNS)/report

@@ -33,9 +33,10 @@
 //! - [`nn`]: networks and their engine, knows no robots
 //! - contracts: [`mod@layout`] (what the entries of a state and an action are: all that learning knows of robot and task), [`task`], [`state`], [`robot`] (robots from files: kinematics, distances, inverse kinematics), [`scene`] (who acts, and what stands where), [`demo`], [`mod@env`]; [`config`], [`pulse`]
 //! - [`tasks`], then [`plan`] (scene to demonstration) and [`sim`] (contact physics, the only home of rapier)
-//! - [`data`]: files, the only home of MCAP, Arrow, Parquet and safetensors; knows no learning
+//! - [`data`]: files, the only home of MCAP, Arrow, Parquet, safetensors and ONNX; knows no learning
 //! - [`learn`]: networks of policy and dynamics, losses, methods, and the loop around them; knows neither files nor simulator
 //! - [`eval`]: policies in the simulator
+//! - [`export`]: policies for programs that are not hilt
 //! - [`experiment`]: grids of runs as steps; starts no process
 //! - [`report`]: pictures, charts, tables, statistics over seeds, pages of experiments
 //! - [`cmd`]: the command line
@@ -49,6 +50,7 @@ pub mod env;
 pub mod error;
 pub mod eval;
 pub mod experiment;
+pub mod export;
 pub mod guard;
 pub mod interrupt;
 pub mod joints;

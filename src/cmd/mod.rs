@@ -10,6 +10,7 @@ mod dropped;
 mod epochs;
 mod evaluate;
 mod experiment;
+mod export;
 mod inspect;
 mod output;
 mod places;

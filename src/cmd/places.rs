@@ -3,7 +3,7 @@
 use super::Console;
 use crate::data::atomic::{self, Target};
 use crate::data::peek::{Format, Peeked, peek};
-use crate::data::{dataset, recording};
+use crate::data::{dataset, onnx, recording};
 use crate::error::{Error, Result};
 use crate::interrupt;
 use crate::report::experiments;
@@ -21,6 +21,8 @@ pub enum Content {
     Weights(&'static str, &'static str),
     /// A summary of this stage.
     Summary(&'static str),
+    /// A network in ONNX.
+    Onnx,
     /// A PNG picture.
     Png,
     /// A GIF animation.
@@ -40,8 +42,8 @@ pub enum Content {
 }
 
 /// Endings of other formats; what follows another dot belongs to a name (policy-0.1).
-const ENDINGS: [&str; 13] =
-    ["parquet", "safetensors", "json", "png", "gif", "log", "mcap", "toml", "txt", "csv", "pt", "pth", "bin"];
+const ENDINGS: [&str; 14] =
+    ["parquet", "safetensors", "onnx", "json", "png", "gif", "log", "mcap", "toml", "txt", "csv", "pt", "pth", "bin"];
 
 /// Inputs and outputs of one command.
 #[derive(Debug, Default)]
@@ -164,6 +166,7 @@ fn check_ending(name: &str, path: &Path, content: Content) -> Result<()> {
         Content::Table(_) => ("parquet", "a Parquet file"),
         Content::Weights(..) => ("safetensors", "a safetensors file"),
         Content::Summary(_) => ("json", "a JSON file"),
+        Content::Onnx => ("onnx", "an ONNX file"),
         Content::Png => ("png", "a PNG picture"),
         Content::Gif => ("gif", "a GIF animation"),
         Content::Log => ("log", "a log"),
@@ -184,6 +187,7 @@ fn check_held(name: &str, path: &Path, content: Content) -> Result<()> {
         Content::Table(stage) => (Format::Parquet, Some(stage), None),
         Content::Weights(kind, stage) => (Format::Safetensors, Some(stage), Some(kind)),
         Content::Summary(stage) => (Format::Json, Some(stage), None),
+        Content::Onnx => (Format::Onnx, Some(onnx::EXPORT), None),
         Content::Png => (Format::Png, None, None),
         Content::Gif => (Format::Gif, None, None),
         Content::Log | Content::Datasets | Content::Report | Content::Pieces | Content::Own => return Ok(()),

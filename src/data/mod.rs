@@ -1,4 +1,4 @@
-//! Files: the only place that knows MCAP, Arrow, Parquet and safetensors.
+//! Files: the only place that knows MCAP, Arrow, Parquet, safetensors and ONNX.
 //!
 //! Every artefact is written beside its place and renamed when whole ([`atomic`]), says where it came from ([`provenance`]) and
 //! carries a seal over its own bytes ([`seal`]), so that a damaged file is refused before any decoder reads it.
@@ -13,6 +13,7 @@ mod inspect;
 pub mod json_file;
 mod json_text;
 mod litter;
+pub mod onnx;
 pub mod origin;
 mod parquet_file;
 mod parquet_limits;

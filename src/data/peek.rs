@@ -1,7 +1,9 @@
 //! What a file is that stands where another is to be written: told from its head and its tail, without reading it whole.
 
+use super::onnx::{EXPORT, PRODUCER};
 use super::provenance::KEY;
 use super::seal::find_last;
+use prost::encoding::{WireType, decode_varint};
 use serde_json::Value;
 use std::fs::File;
 use std::io::{Read, Result, Seek, SeekFrom};
@@ -19,6 +21,11 @@ const LENGTH: u64 = 8;
 /// What a provenance's text has before and behind its stage.
 const VERSION: &[u8] = b"\"schema_version\":";
 const STAGE: &[u8] = b"\"stage\":\"";
+/// Keys of the first two fields of ONNX files: the format's version in one byte, then the name of the program that wrote it.
+const ONNX_VERSION: u8 = 0x08;
+const ONNX_PRODUCER: u8 = 0x12;
+/// Bytes of a field's key and of the number that follows, at most.
+const LONGEST_KEY: u64 = 20;
 /// The stage comes within so many bytes after the version.
 const NEAR: usize = 64;
 
@@ -39,6 +46,8 @@ pub enum Format {
     Png,
     /// GIF.
     Gif,
+    /// ONNX.
+    Onnx,
     /// None of these.
     Other,
 }
@@ -70,6 +79,7 @@ pub fn peek(path: &Path) -> Result<Peeked> {
         Format::Parquet => in_tail(&mut file, size, b"PAR1", format)?,
         Format::Mcap => in_tail(&mut file, size, mcap::MAGIC, format)?,
         Format::Safetensors => in_header(&mut file, size, &head)?,
+        Format::Onnx => in_fields(&mut file, size, &head)?,
         Format::Json if size <= LONGEST_JSON => in_json(&part(&mut file, 0, size)?),
         _ => plain,
     })
@@ -84,6 +94,8 @@ pub(super) fn format_of(head: &[u8]) -> Format {
         [b'G', b'I', b'F', b'8', ..] => Format::Gif,
         [b'{', ..] => Format::Json,
         [_, _, _, _, _, 0, 0, 0, b'{', ..] => Format::Safetensors,
+        // Two numbers of the beginning of every ONNX file: its version's field and its producer's.
+        [ONNX_VERSION, _, ONNX_PRODUCER, ..] => Format::Onnx,
         _ if head.starts_with(mcap::MAGIC) => Format::Mcap,
         _ => Format::Other,
     }
@@ -115,6 +127,32 @@ fn in_header(file: &mut File, size: u64, head: &[u8]) -> Result<Peeked> {
         kind: word(&hilt["kind"]),
         whole: header.is_some() && length.saturating_add(LENGTH) <= size,
     })
+}
+
+/// Of a network for other programs, a protobuf: who wrote it, and of our own whether its fields end where the file does.
+fn in_fields(file: &mut File, size: u64, head: &[u8]) -> Result<Peeked> {
+    let named = |(length, name): (&u8, &[u8])| usize::from(*length) == PRODUCER.len() && name.starts_with(PRODUCER.as_bytes());
+    if !head.get(3..).and_then(<[u8]>::split_first).is_some_and(named) {
+        return Ok(Peeked { format: Format::Onnx, stage: None, kind: None, whole: true });
+    }
+    let mut at = 0;
+    while at < size {
+        let bytes = part(file, at, LONGEST_KEY)?;
+        at = field_end(&bytes).and_then(|length| at.checked_add(length)).unwrap_or(u64::MAX);
+    }
+    Ok(Peeked { format: Format::Onnx, stage: Some(EXPORT.into()), kind: None, whole: at == size })
+}
+
+/// Bytes of the field that begins here, whose value is a number or has its length before it.
+fn field_end(bytes: &[u8]) -> Option<u64> {
+    let mut rest = bytes;
+    let (key, value) = (decode_varint(&mut rest).ok()?, decode_varint(&mut rest).ok()?);
+    let length = match WireType::try_from(key & 7).ok()? {
+        WireType::Varint => 0,
+        WireType::LengthDelimited => value,
+        _ => return None,
+    };
+    length.checked_add((bytes.len() - rest.len()) as u64)
 }
 
 fn in_json(text: &[u8]) -> Peeked {

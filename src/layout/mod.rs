@@ -142,6 +142,16 @@ impl Layout {
         self.action.iter().map(|span| span.entries.len()).sum()
     }
 
+    /// Names of a state's entries, in order.
+    pub fn state_entries(&self) -> impl Iterator<Item = &String> {
+        self.state.iter().flat_map(|span| &span.entries)
+    }
+
+    /// Names of an action's entries, in order.
+    pub fn action_entries(&self) -> impl Iterator<Item = &String> {
+        self.action.iter().flat_map(|span| &span.entries)
+    }
+
     /// How many entries of a state, from the first, may change during an episode: what a dynamics network predicts.
     pub fn changing(&self) -> usize {
         self.state.iter().filter(|span| !span.holds.is_fixed()).map(|span| span.entries.len()).sum()

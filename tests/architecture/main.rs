@@ -12,7 +12,7 @@ const LEAVES: [&str; 9] = ["error", "guard", "interrupt", "joints", "math", "see
 
 /// What else each module may use. The order is the house's: a module uses only those above it. One that is not here is refused, so that a
 /// new one gets its place on purpose.
-const FLOW: [(&str, &[&str]); 20] = [
+const FLOW: [(&str, &[&str]); 21] = [
     ("nn", &[]),
     ("layout", &[]),
     ("task", &[]),
@@ -29,6 +29,7 @@ const FLOW: [(&str, &[&str]); 20] = [
     ("data", &["config", "demo", "layout", "robot", "scene", "state", "task", "tasks"]),
     ("learn", &["config", "demo", "env", "layout", "nn", "pulse"]),
     ("eval", &["config", "demo", "learn", "scene", "sim", "state", "task", "tasks"]),
+    ("export", &["config", "data", "layout", "learn", "nn"]),
     ("experiment", &["config", "data", "eval", "learn", "plan", "task", "tasks"]),
     ("report", &["config", "data", "demo", "eval", "experiment", "learn", "robot", "scene", "state", "task", "tasks"]),
     (
@@ -40,6 +41,7 @@ const FLOW: [(&str, &[&str]); 20] = [
             "env",
             "eval",
             "experiment",
+            "export",
             "layout",
             "learn",
             "nn",

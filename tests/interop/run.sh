@@ -1,9 +1,10 @@
 #!/bin/sh
-# Reads finished runs with other people's programs. Usage: tests/interop/run.sh RUNS   (RUNS holds TASK/recordings, TASK/dataset, ...)
+# Reads finished runs with other people's programs, and runs their policies. Usage: tests/interop/run.sh RUNS HILT
+# RUNS holds TASK/recordings, TASK/dataset, ..., and what tests/interop/policies.sh leaves; HILT is the binary.
 # PYTHON names a Python 3.12; without it python3.12 on the PATH, then pyenv's. The packages (6 GB, most of it torch) go to
 # target/interop, once.
 set -eu
-[ $# -eq 1 ] || { echo "usage: $0 RUNS" >&2; exit 2; }
+[ $# -eq 2 ] || { echo "usage: $0 RUNS HILT" >&2; exit 2; }
 here=$(cd "$(dirname "$0")" && pwd)
 home=$here/../../target/interop
 
@@ -23,4 +24,5 @@ if ! cmp -s "$here/requirements.txt" "$home/installed.txt"; then
     "$home/venv/bin/pip" install --quiet --disable-pip-version-check --requirement "$here/requirements.txt"
     cp "$here/requirements.txt" "$home/installed.txt"
 fi
-HF_HUB_OFFLINE=1 HF_HOME="$home/huggingface" exec "$home/venv/bin/python" "$here/run.py" "$1"
+HF_HUB_OFFLINE=1 HF_HOME="$home/huggingface" "$home/venv/bin/python" "$here/run.py" "$1"
+exec "$home/venv/bin/python" "$here/policies.py" "$1" "$2"

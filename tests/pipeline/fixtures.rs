@@ -3,6 +3,7 @@
 use crate::runs::{HILT, contents, text};
 use hilt::data::dataset::{self, Dataset, DatasetEpisode};
 use hilt::data::{recording, table_file, weights};
+use hilt::learn::Policy;
 use hilt::robot::file::built_in::paper_robot;
 use hilt::table::Values;
 use hilt::task::built_in::find;
@@ -70,6 +71,21 @@ fn files_of_the_version_before_are_of_the_papers_robot() {
     assert_eq!(found.layout, task.layout(&paper_robot()));
     let demo = episode.to_demo().expect("a demo");
     assert_eq!((found.demos[0].states(), found.demos[0].layout()), (demo.states(), demo.layout()));
+}
+
+/// From before weights named the inputs of their network.
+#[test]
+fn a_policy_that_does_not_name_its_inputs_is_the_same_policy() {
+    let read = |path: PathBuf| {
+        let (tensors, meta, _) = weights::read(&path, "policy").expect("weights");
+        (Policy::from_tensors(&tensors, &meta).expect("a policy"), meta)
+    };
+    let (old, old_meta) = read(fixtures().join("older/policy.safetensors"));
+    let (new, new_meta) = read(fixtures().join("pick-up/policy.safetensors"));
+    assert!(old_meta.get("inputs").is_none() && new_meta["inputs"].is_array());
+    assert_eq!(old.meta()["inputs"], new_meta["inputs"]);
+    let shapes = |policy: &Policy| policy.to_tensors().into_iter().map(|t| (t.name, t.shape)).collect::<Vec<_>>();
+    assert_eq!(shapes(&old), shapes(&new));
 }
 
 #[test]

@@ -37,6 +37,7 @@ pub fn inspect(path: &Path, interrupt: &Interrupt) -> Result<Value> {
         Format::Parquet => tables::one(path),
         Format::Safetensors => network(path),
         Format::Json => summary(path),
+        Format::Onnx => Err(Error::input(path, "is a network for other programs (ONNX); inspect the policy that it was made of")),
         _ => Err(Error::input(
             path,
             "is no artefact of hilt; expected a recording (MCAP), a table (Parquet), weights (safetensors), a summary (JSON), a dataset or \

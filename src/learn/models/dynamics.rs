@@ -192,6 +192,13 @@ impl Dynamics {
         state[..next.len()].copy_from_slice(&next);
     }
 
+    /// What the network's inputs are called, in order: those of its features, then the action's entries.
+    fn input_names(&self) -> Vec<String> {
+        let mut names = self.features.names();
+        names.extend(self.layout.action_entries().cloned());
+        names
+    }
+
     /// All arrays.
     pub fn to_tensors(&self) -> Vec<NamedTensor> {
         let mut out = Vec::new();
@@ -213,6 +220,7 @@ impl Dynamics {
             "layout": *self.layout,
             "features": features,
             "mask_dq": mask_dq,
+            "inputs": self.input_names(),
             "structure": self.structure,
             "activation": self.net.activation(),
             "hidden": &widths[1..widths.len() - 1],
@@ -233,7 +241,7 @@ impl Dynamics {
         let (changing, action_dim) = (layout.changing(), layout.action_dim());
         let net = reader.network("dynamics", features.width() + action_dim, changing)?;
         let structure = reader.meta("structure")?;
-        Ok(Dynamics {
+        let dynamics = Dynamics {
             structure,
             known: known(&layout, structure),
             features,
@@ -242,7 +250,9 @@ impl Dynamics {
             layout,
             net,
             settings,
-        })
+        };
+        reader.inputs(&dynamics.input_names())?;
+        Ok(dynamics)
     }
 }
 

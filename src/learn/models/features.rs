@@ -2,6 +2,7 @@
 
 use super::corpus::Corpus;
 use super::hand::{Hand, Vec3};
+use super::names::{near_names, relation_names};
 use super::relations::{Relating, Relations, UNRELATED};
 use super::scaling::Scaling;
 use crate::config::FeatureSet;
@@ -12,8 +13,8 @@ use std::sync::Arc;
 
 /// Spread below which a state entry counts as constant (1 cm, 0.01 rad, 0.01 rad/s, 0.01 of a quaternion).
 const STATE_FLOOR: f32 = 0.01;
-/// Range of the near features \[m\].
-const NEAR_M: f32 = 0.015;
+/// Range of the near features \[m\]: each is tanh(distance / range).
+pub const NEAR_M: f32 = 0.015;
 
 /// The map from a state row to a network's inputs: kept state entries, then what kinematics derive, then the near features.
 #[derive(Clone, Debug, PartialEq)]
@@ -59,7 +60,23 @@ impl Features {
         self.kept.len() + self.derived.width() + self.near_width()
     }
 
-    fn near_width(&self) -> usize {
+    /// What the inputs are called, in order.
+    pub fn names(&self) -> Vec<String> {
+        let state: Vec<&String> = self.layout.state_entries().collect();
+        let mut names: Vec<String> = self.kept.iter().map(|i| state[*i].clone()).collect();
+        let relations = if self.needs_hand() { relation_names(&self.layout) } else { Vec::new() };
+        let near = if self.near_width() > 0 { near_names(&relations) } else { Vec::new() };
+        names.extend(relations.into_iter().chain(near));
+        names
+    }
+
+    /// The entries of the state that are inputs.
+    pub fn kept(&self) -> &[usize] {
+        &self.kept
+    }
+
+    /// Number of near features: of the last of what is derived.
+    pub fn near_width(&self) -> usize {
         if self.set == FeatureSet::FkNear { self.relating.near_width() } else { 0 }
     }
 
@@ -161,7 +178,8 @@ impl Features {
 mod tests {
     use super::*;
     use crate::demo::Demo;
-    use crate::learn::tests::testing::{JOINTS, Toy, demo, random_states};
+    use crate::layout::{POINT_DIM, POSE_DIM};
+    use crate::learn::tests::testing::{BASE_DIM, JOINTS, Toy, demo, random_states};
 
     #[test]
     fn features_gradients_equal_finite_differences() {
@@ -199,6 +217,28 @@ mod tests {
                 assert!(error < 0.02 * (1.0 + numeric.abs()), "{toy:?} {set:?} entry {i}: {analytic} against {numeric}");
             }
         }
+    }
+
+    #[test]
+    fn every_input_has_a_name_of_its_own() {
+        let corpus = |toy| Corpus::new(&[demo(toy, 30, 1)], "training").expect("a demo");
+        for toy in [Toy::PickUp, Toy::PickAndPlace, Toy::Stack, Toy::Tower] {
+            for (set, mask_dq) in [(FeatureSet::Raw, false), (FeatureSet::Fk, true), (FeatureSet::FkNear, false)] {
+                let features = Features::fit(&corpus(toy), set, mask_dq);
+                let names: std::collections::BTreeSet<String> = features.names().into_iter().collect();
+                assert_eq!((names.len(), features.names().len()), (features.width(), features.width()), "{toy:?} {set:?}");
+            }
+        }
+        let names = Features::fit(&corpus(Toy::Tower), FeatureSet::FkNear, true).names();
+        let place = |name: &str| names.iter().position(|n| n == name).unwrap_or_else(|| panic!("{name} is none of {names:?}"));
+        let state = BASE_DIM - JOINTS + POSE_DIM + POINT_DIM;
+        assert_eq!(place("q.0"), 0);
+        assert_eq!(place("hand.tool.x_m"), state);
+        assert_eq!(place("hand.y_axis.z"), state + 8);
+        assert_eq!(place("other.in_hand.x_m"), state + 12);
+        assert_eq!(place("block.to_other.z_m"), state + 17);
+        assert_eq!(place("block.in_hand.x_near"), state + 21);
+        assert_eq!(place("other.to_goal.z_near"), names.len() - 1);
     }
 
     #[test]

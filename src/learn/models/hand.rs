@@ -69,21 +69,41 @@ impl Hand {
 }
 
 /// pi / 2 in two parts: the first has few digits, so that its product with a number of quarter turns is exact.
-const HALF_PI_HIGH: f32 = 1.570_312_5;
-const HALF_PI_LOW: f32 = 4.838_268e-4;
+pub const HALF_PI: [f32; 2] = [1.570_312_5, 4.838_268e-4];
+/// Taylor series of sin(f) / f in f^2, for |f| <= pi / 4; the first term left out is worth 2e-9.
+pub const SIN: Series = Series { terms: [1.0, -1.0 / 6.0, 1.0 / 120.0, -1.0 / 5040.0], last: 362_880.0 };
+/// Taylor series of cos(f) in f^2; the first term left out is worth 2e-8.
+pub const COS: Series = Series { terms: [1.0, -0.5, 1.0 / 24.0, -1.0 / 720.0], last: 40_320.0 };
 /// 1.5 x 2^23: adding it rounds a small f32 to an integer, which then stands in the low bits.
 const ROUND: f32 = 12_582_912.0;
+
+/// A polynomial.
+#[derive(Clone, Copy, Debug)]
+pub struct Series {
+    /// Its coefficients from the constant on, without the last.
+    pub terms: [f32; 4],
+    /// One over the last.
+    pub last: f32,
+}
+
+impl Series {
+    /// Its value at `x`.
+    #[inline(always)]
+    fn at(&self, x: f32) -> f32 {
+        let [a, b, c, d] = self.terms;
+        a + x * (b + x * (c + x * (d + x / self.last)))
+    }
+}
 
 /// Sine and cosine to about 2e-7 for |x| up to a few dozen turns; the same bytes on every platform, unlike the system's.
 #[inline(always)]
 pub fn sin_cos(x: Lanes) -> (Lanes, Lanes) {
     let rounded = x.map(|x| x * FRAC_2_PI + ROUND);
     let turns = rounded.map(|r| r - ROUND);
-    let f = (x - turns * HALF_PI_HIGH) - turns * HALF_PI_LOW;
+    let f = (x - turns * HALF_PI[0]) - turns * HALF_PI[1];
     let f2 = f * f;
-    // Taylor series on |f| <= pi / 4; the first terms left out are worth 2e-9 and 2e-8.
-    let sin = f * f2.map(|f2| 1.0 + f2 * (-1.0 / 6.0 + f2 * (1.0 / 120.0 + f2 * (-1.0 / 5040.0 + f2 / 362_880.0))));
-    let cos = f2.map(|f2| 1.0 + f2 * (-0.5 + f2 * (1.0 / 24.0 + f2 * (-1.0 / 720.0 + f2 / 40_320.0))));
+    let sin = f * f2.map(|f2| SIN.at(f2));
+    let cos = f2.map(|f2| COS.at(f2));
     // a quarter turn makes (sin, cos) of (cos, -sin)
     let quarter = |i: usize| rounded.0[i].to_bits();
     let pick = |i: usize, even: f32, odd: f32, minus: u32| {

@@ -5,6 +5,7 @@ mod dynamics;
 mod features;
 mod hand;
 mod model_report;
+mod names;
 mod older;
 mod policy;
 mod relations;
@@ -14,8 +15,8 @@ mod weights;
 
 pub use corpus::{Corpus, row};
 pub use dynamics::{Dynamics, STEP_FLOOR};
-pub use features::{Features, derived_width};
-pub use hand::Hand;
+pub use features::{Features, NEAR_M, derived_width};
+pub use hand::{COS, HALF_PI, Hand, SIN, Series};
 pub use model_report::{ModelReport, error_table};
 pub use policy::Policy;
 pub use samples::{ModelSamples, PolicySamples, Samples};

@@ -91,12 +91,19 @@ impl Policy {
         &self.settings
     }
 
-    pub(in crate::learn) fn features(&self) -> &Features {
+    /// What it sees of a state.
+    pub fn features(&self) -> &Features {
         &self.features
     }
 
-    pub(in crate::learn) fn action_scaling(&self) -> &Scaling {
+    /// Statistics of the actions; the network's outputs are in their units.
+    pub fn action_scaling(&self) -> &Scaling {
         &self.action
+    }
+
+    /// The network.
+    pub fn network(&self) -> &Mlp {
+        &self.net
     }
 
     /// Mean action in `state_row`, in the units of the layout.
@@ -147,6 +154,7 @@ impl Policy {
             "layout": **self.layout(),
             "features": features,
             "mask_dq": mask_dq,
+            "inputs": self.features.names(),
             "activation": self.net.activation(),
             "hidden": &widths[1..widths.len() - 1],
             "horizon_steps": self.horizon_steps,
@@ -168,6 +176,7 @@ impl Policy {
         let settings: TrainSettings = reader.settings(older::of_policy)?;
         settings.validate().map_err(|why| format!("its settings cannot have trained it: {why}"))?;
         let features = reader.features("policy", &layout)?;
+        reader.inputs(&features.names())?;
         let net = reader.network("policy", features.width(), layout.action_dim())?;
         Ok(Policy {
             horizon_steps,
@@ -220,6 +229,7 @@ mod tests {
             ("horizon_steps", json!(0), "is 0; allowed: 1 to 20000"),
             ("horizon_steps", json!(4_294_967_295u32), "is 4294967295; allowed: 1 to 20000"),
             ("horizon_steps", json!("9".repeat(100_000)), "(100002 characters)"),
+            ("inputs", json!(["a", "b"]), "\"inputs\" of the description names 2 inputs, but the network has 49"),
             ("settings", json!({ "tau": 0.0 }), "train.tau = 0"),
             ("settings", json!({ "hidden_units": 1e18 as u64 }), "train.hidden_units"),
         ] {
@@ -238,6 +248,18 @@ mod tests {
             let message = Policy::from_tensors(&tensors, &policy.meta()).expect_err(name);
             assert!(message.contains(said), "{name}: {message}");
         }
+    }
+
+    #[test]
+    fn inputs_in_another_order_are_refused_and_none_are_needed() {
+        let corpus = Corpus::new(demos(Toy::Stack, 3, 20, 0), "training").expect("demos");
+        let policy = Policy::new(&corpus, &TrainSettings::default(), &mut stream(0, "test", 0));
+        let mut meta = policy.meta();
+        meta["inputs"].as_array_mut().expect("names").swap(0, 3);
+        let message = Policy::from_tensors(&policy.to_tensors(), &meta).expect_err("another order");
+        assert!(message.contains("has \"q.3\" in place 0, where \"q.0\" is computed"), "{message}");
+        meta.as_object_mut().expect("an object").remove("inputs");
+        assert_eq!(Policy::from_tensors(&policy.to_tensors(), &meta).as_ref(), Ok(&policy));
     }
 
     #[test]

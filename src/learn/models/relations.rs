@@ -5,7 +5,7 @@ use crate::layout::{Layout, MOST_AIMS, MOST_OBJECTS};
 use crate::nn::{LANES, Lanes};
 
 /// Tool position and two columns of the hand's rotation.
-const HAND_WIDTH: usize = 9;
+pub const HAND_WIDTH: usize = 9;
 
 /// What kinematics derive from a state: tool point, two columns of the hand's rotation, each object in the hand's frame, and for each aim
 /// where the object is to go minus where it is. Only the first [`Relating::width`] entries are used.

@@ -82,6 +82,25 @@ impl Reader<'_> {
         Ok(Arc::new(layout))
     }
 
+    /// Refuses a description that has the inputs in another order than they are `computed` in; an older one does not name them.
+    pub fn inputs(&self, computed: &[String]) -> Result<(), String> {
+        if self.meta.get("inputs").is_none() {
+            return Ok(());
+        }
+        let named: Vec<String> = self.meta("inputs")?;
+        if named.len() != computed.len() {
+            let (named, computed) = (named.len(), computed.len());
+            return Err(format!("\"inputs\" of the description names {named} inputs, but the network has {computed}"));
+        }
+        match named.iter().zip(computed).position(|(named, computed)| named != computed) {
+            None => Ok(()),
+            Some(at) => {
+                let (named, computed) = (shown(&named[at]), shown(&computed[at]));
+                Err(format!("\"inputs\" of the description has \"{named}\" in place {at}, where \"{computed}\" is computed"))
+            }
+        }
+    }
+
     /// The values of a tensor of this shape.
     pub fn tensor(&self, name: &str, shape: &[usize]) -> Result<Vec<f32>, String> {
         let tensor = self.tensors.iter().find(|t| t.name == name).ok_or_else(|| format!("tensor {name} is missing"))?;

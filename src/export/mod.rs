@@ -1,0 +1,5 @@
+//! Policies for programs that are not hilt.
+
+mod features;
+pub mod onnx;
+mod trigonometry;
