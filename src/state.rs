@@ -3,7 +3,7 @@
 use crate::joints::Joints;
 use crate::math;
 use crate::task::Task;
-use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion};
+use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};
 
 /// Control rate \[Hz\].
@@ -38,6 +38,12 @@ impl Pose {
     /// Turn about the world's z axis \[rad\].
     pub fn yaw_rad(&self) -> f64 {
         self.isometry().rotation.euler_angles().2
+    }
+
+    /// Cosine of the angle by which it leans, against how it stood: 1 upright, 0 on its side.
+    pub fn uprightness(&self, stood: &Pose) -> f64 {
+        let up = stood.isometry().rotation.inverse() * Vector3::z();
+        (self.isometry() * up).z
     }
 
     /// The same as an nalgebra isometry.

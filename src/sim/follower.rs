@@ -6,9 +6,10 @@
 use super::Controller;
 use crate::demo::Phase;
 use crate::joints::Joints;
+use crate::math::cos;
 use crate::plan::Plan;
 use crate::robot::Robot;
-use crate::state::{Action, CONTROL_DT_S};
+use crate::state::{Action, CONTROL_DT_S, Pose};
 use crate::task::Target;
 use crate::tasks::Observation;
 use nalgebra::{Matrix6, Vector3, Vector6};
@@ -36,8 +37,10 @@ const CLOSE_Z_M: f64 = 0.004;
 const OPEN_XY_M: f64 = 0.008;
 /// ... and this little above it \[m\].
 const OPEN_Z_M: f64 = 0.004;
-/// ... or, once it stands on something, this little: a cube of 5 cm that leans by 20 degrees in the hand comes no lower than 7 mm \[m\].
+/// ... or, when it leans in the hand and touches something, this little: a cube of 5 cm that leans by 20 degrees comes no lower than 7 mm \[m\].
 const LEANING_Z_M: f64 = 0.008;
+/// An object leans in the hand from this angle on \[rad\] (8 degrees): a cube of 5 cm that leans less comes as low as 4 mm.
+const LEANING_RAD: f64 = 8.0 * std::f64::consts::PI / 180.0;
 /// The way up from a released object ends for the next goal when so little of it is left \[m\]: there is nothing to be exact about.
 const RETREATED_M: f64 = 0.02;
 /// The grip is firm when the fingers move slower than this share of the speed with which they close.
@@ -94,6 +97,8 @@ impl Segment {
 struct Course {
     /// The object, by its place in the task.
     object: usize,
+    /// How it stands at the start.
+    stood: Pose,
     approach: Segment,
     carry: Segment,
     retreat: Option<Segment>,
@@ -112,7 +117,8 @@ impl Course {
         let approach = Segment::new(plan, goal, Phase::Approach)?;
         let carry = Segment::new(plan, goal, Phase::Carry)?;
         let retreat = Segment::new(plan, goal, Phase::Retreat);
-        let object_from_tool_m = Vector3::from(scene.objects[object].pose.position_m) - carry.tool_m[0];
+        let stood = scene.objects[object].pose;
+        let object_from_tool_m = Vector3::from(stood.position_m) - carry.tool_m[0];
         let release_m = retreat.is_some().then(|| Vector3::from(scene.target_m(goal)));
         let support = match scene.task.goals[goal].target {
             Target::On(other) | Target::In(other) if scene.task.goal_of(other).is_some() => {
@@ -120,7 +126,7 @@ impl Course {
             }
             _ => None,
         };
-        Some(Course { object, approach, carry, retreat, object_from_tool_m, release_m, support })
+        Some(Course { object, stood, approach, carry, retreat, object_from_tool_m, release_m, support })
     }
 
     /// How far the object's target is from where the plan has it \[m\]: it stands on what was put there just now.
@@ -171,7 +177,8 @@ impl Follower {
             }
             Phase::Carry => {
                 let object = Vector3::from(seen.at(course.object)) - course.astray_m(seen);
-                let least_m = if seen.touches(course.object) { LEANING_Z_M } else { OPEN_Z_M };
+                let leans = seen.objects[course.object].pose.uprightness(&course.stood) < cos(LEANING_RAD);
+                let least_m = if leans && seen.touches(course.object) { LEANING_Z_M } else { OPEN_Z_M };
                 if course.release_m.is_some_and(|to| (object - to).xy().norm() < OPEN_XY_M && object.z - to.z < least_m) {
                     self.enter(Phase::Open);
                 }

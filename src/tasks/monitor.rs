@@ -4,7 +4,7 @@ use super::goal::{PAID_GRASPED, PAID_REACHED};
 use super::observation::Observation;
 use crate::math::cos;
 use crate::scene::Scene;
-use crate::state::{CONTROL_HZ, Pose};
+use crate::state::CONTROL_HZ;
 use crate::task::{FailureClass, Target};
 use nalgebra::Vector3;
 
@@ -127,7 +127,7 @@ impl History {
     fn classify(&self, scene: &Scene, goal: usize, last: &Observation) -> FailureClass {
         let (object, kind) = (scene.task.goals[goal].object, scene.task.goals[goal].kind());
         let gripped = last.gripped(object);
-        let leaning = leans(&scene.objects[object].pose, &last.objects[object].pose);
+        let leaning = last.objects[object].pose.uprightness(&scene.objects[object].pose) < cos(TOPPLE_RAD);
         let off_after_met = match scene.task.goals[goal].target {
             Target::On(other) => self.met_once && !last.contacts.objects[object].objects.contains(&other) && !gripped,
             _ => false,
@@ -157,10 +157,4 @@ fn support_pushed(scene: &Scene, last: &Observation) -> bool {
         let pushed = (Vector3::from(last.at(object)) - Vector3::from(then)).norm();
         pushed > scene.task.objects[object].shape.half_width_m()
     })
-}
-
-/// Whether an object leans, against how it stood.
-fn leans(then: &Pose, now: &Pose) -> bool {
-    let up_then = then.isometry().rotation.inverse() * Vector3::z();
-    (now.isometry() * up_then).z < cos(TOPPLE_RAD)
 }
