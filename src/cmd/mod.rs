@@ -11,6 +11,7 @@ mod epochs;
 mod evaluate;
 mod experiment;
 mod inspect;
+mod learning;
 mod output;
 mod places;
 mod plan;

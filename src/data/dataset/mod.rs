@@ -6,10 +6,12 @@
 //! validation episodes enters a normalisation. `meta/info.json` lists the content hash of every other file and seals itself.
 
 mod check;
+pub mod edit;
 mod episode;
 mod episodes;
 mod features;
 mod files;
+pub mod foreign;
 mod meta;
 mod read;
 mod rows;
@@ -85,6 +87,11 @@ pub fn write_split<'a>(
         }
         Ok(())
     })
+}
+
+/// Whether a path below one dataset's root is one of it.
+pub fn is_root_file(path: &Path) -> bool {
+    meta::is_file(path)
 }
 
 /// Whether a path below the two datasets is one of theirs.

@@ -105,7 +105,7 @@ impl<F: FnMut(DatasetEpisode)> Rows<F> {
     }
 
     fn check_column(&self, path: &Path, batch: &RecordBatch, feature: &Feature) -> Result<()> {
-        let (name, width, task) = (feature.name, feature.width, &self.layout.name);
+        let (name, width, task) = (feature.name.as_ref(), feature.width, &self.layout.name);
         let wrong = |what: String| Error::input(path, format!("column {name} {what}"));
         let column = batch.column_by_name(name).ok_or_else(|| wrong("is missing".into()))?;
         let expected = field(feature);
