@@ -163,7 +163,9 @@ pub fn same_task(path: &Path, made: &Provenance, pipeline: &Pipeline) -> Result<
     if made.settings.get(FOREIGN).is_some() {
         return Err(Error::input(
             path,
-            format!("was learned from {theirs}, a dataset of another program, not from demos of {ours}: hilt has no simulator for it"),
+            format!(
+                "was learned from {theirs}, a dataset of another program, not from demos of {ours}: hilt has no simulator for it"
+            ),
         ));
     }
     if theirs != ours {

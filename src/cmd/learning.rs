@@ -58,7 +58,8 @@ impl Learning {
             return Ok(Learning { subject: Subject::Dataset(Box::new((learning, source))), dataset: dir.into() });
         }
         if !columns.state.is_empty() || columns.action.is_some() {
-            let message = "--state and --action choose columns of a dataset of another program; the columns of hilt's own are known";
+            let message =
+                "--state and --action choose columns of a dataset of another program; the columns of hilt's own are known";
             return Err(Error::Usage(message.into()));
         }
         let pipeline = settings.resolve(flags)?;
@@ -79,7 +80,8 @@ impl Learning {
     /// # Errors
     /// [`Error::Usage`] for a dataset of another program.
     pub fn simulated(&self, what: &str) -> Result<&Pipeline> {
-        let why = || format!("{what} needs the task's simulator, which a dataset of another program has not; allowed: hil, bc and sc");
+        let why =
+            || format!("{what} needs the task's simulator, which a dataset of another program has not; allowed: hil, bc and sc");
         self.pipeline().ok_or_else(|| Error::Usage(why()))
     }
 
@@ -103,9 +105,7 @@ impl Learning {
     pub fn path_or(&self, given: Option<&Path>, name: &str) -> PathBuf {
         match &self.subject {
             Subject::Task(pipeline) => path_or(given, pipeline, name),
-            Subject::Dataset(of) => {
-                given.map_or_else(|| Path::new(RUNS).join(&of.1.layout.name).join(name), Path::to_path_buf)
-            }
+            Subject::Dataset(of) => given.map_or_else(|| Path::new(RUNS).join(&of.1.layout.name).join(name), Path::to_path_buf),
         }
     }
 

@@ -6,6 +6,7 @@ mod common;
 mod console;
 mod context;
 mod convert;
+mod dataset;
 mod dropped;
 mod epochs;
 mod evaluate;

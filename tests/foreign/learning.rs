@@ -41,7 +41,9 @@ fn a_dataset_written_by_hand_is_read_as_it_says() {
 /// The first and the last validation loss of a table of epochs.
 fn validated(path: &Path, column: &str) -> (f64, f64) {
     let (table, _) = table_file::read(path).expect("a table");
-    let Values::F64(values) = &table.columns.iter().find(|c| c.name == column).expect("a column").values else { panic!("numbers") };
+    let Values::F64(values) = &table.columns.iter().find(|c| c.name == column).expect("a column").values else {
+        panic!("numbers")
+    };
     let known: Vec<f64> = values.iter().copied().filter(|v| v.is_finite()).collect();
     (known[0], known[known.len() - 1])
 }
@@ -56,7 +58,7 @@ fn fixtures_of_other_programs_train_all_three_methods_to_policies_that_carry_the
         assert!(said.contains("training and"), "{said}");
         assert_eq!(said.contains("skips observation.images.top"), name == "lerobot", "{said}");
         let run = dir.path().join("runs").join(name);
-        let (first, last) = validated(&run.join("dynamics.pretraining.parquet"), "l_model_validation");
+        let (first, last) = validated(&run.join("dynamics.pretraining.parquet"), "validation_l_model");
         assert!(last < first, "{name}: {first} to {last}");
         for (method, policy) in [("hil", "policy"), ("bc", "policy-bc"), ("sc", "policy-sc")] {
             done(dir.path(), &[&["train", "--method", method], &more[..]].concat());
@@ -86,10 +88,15 @@ fn the_same_command_gives_the_same_bytes_for_any_number_of_threads() {
         let more = [&["--dataset", &data, "--threads", threads][..], &TINY].concat();
         done(dir.path(), &[&["pretrain"], &more[..]].concat());
         done(dir.path(), &[&["train"], &more[..]].concat());
-        let names = |(path, bytes): (std::path::PathBuf, Vec<u8>)| (path.strip_prefix(dir.path()).expect("below").to_path_buf(), bytes);
+        let names =
+            |(path, bytes): (std::path::PathBuf, Vec<u8>)| (path.strip_prefix(dir.path()).expect("below").to_path_buf(), bytes);
         contents(dir.path()).into_iter().map(names).collect::<Vec<_>>()
     });
-    assert!(files[0] == files[1] && files[0].len() == 5, "{:?}", files.map(|f| f.into_iter().map(|(name, _)| name).collect::<Vec<_>>()));
+    assert!(
+        files[0] == files[1] && files[0].len() == 5,
+        "{:?}",
+        files.map(|f| f.into_iter().map(|(name, _)| name).collect::<Vec<_>>())
+    );
 }
 
 #[test]
@@ -115,8 +122,10 @@ fn two_roots_are_training_and_validation_and_columns_can_be_chosen() {
 #[test]
 fn next_states_give_a_transition_more_and_executed_actions_are_taken() {
     let edited = open(&fixture("edited"), &Choice::default()).expect("a dataset");
-    let frames: usize = edited.read(1, 0).map(|read| read.train.iter().chain(&read.validation).map(|demo| demo.len()).sum()).expect("demos");
-    let info: Value = serde_json::from_slice(&fs::read(fixture("edited").join("meta/info.json")).expect("readable")).expect("JSON");
+    let frames: usize =
+        edited.read(1, 0).map(|read| read.train.iter().chain(&read.validation).map(|demo| demo.len()).sum()).expect("demos");
+    let info: Value =
+        serde_json::from_slice(&fs::read(fixture("edited").join("meta/info.json")).expect("readable")).expect("JSON");
     assert_eq!(info["total_frames"], json!(frames), "every frame is a transition");
     let read = edited.read(1, 0).expect("demos");
     assert_ne!(read.train[0].actions(), read.train[0].executed());
@@ -126,18 +135,36 @@ fn next_states_give_a_transition_more_and_executed_actions_are_taken() {
 fn what_is_wrong_is_said_in_one_sentence_by_column_and_row() {
     type Spoil = fn(&mut Made);
     let spoilt: [(Spoil, &str); 14] = [
-        (|m| m.info["codebase_version"] = json!("v2.1"), "has codebase_version \"v2.1\", hilt reads \"v3.0\"; convert it first: python -m lerobot"),
-        (|m| *m = std::mem::replace(m, made(&[2])).without("action"), "has no column action; its columns of numbers are observation.state (choose with --action)"),
-        (|m| *m = std::mem::replace(m, made(&[2])).without("observation.state"), "has no column observation.state; name the columns"),
+        (
+            |m| m.info["codebase_version"] = json!("v2.1"),
+            "has codebase_version \"v2.1\", hilt reads \"v3.0\"; convert it first: python -m lerobot",
+        ),
+        (
+            |m| *m = std::mem::replace(m, made(&[2])).without("action"),
+            "has no column action; its columns of numbers are observation.state (choose with --action)",
+        ),
+        (
+            |m| *m = std::mem::replace(m, made(&[2])).without("observation.state"),
+            "has no column observation.state; name the columns",
+        ),
         (|m| *m = std::mem::replace(m, made(&[2])).without("index"), "has no column index, which says where a row belongs"),
         (|m| m.columns.retain(|(name, _)| name != "action"), "has no column action, which meta/info.json declares"),
         (|m| m.info["features"]["action"]["dtype"] = json!("string"), "has string in column action, and numbers are needed"),
-        (|m| m.info["features"]["observation.state"]["shape"] = json!([4]), "column observation.state, row 0: has 3 values, meta/info.json says 4"),
+        (
+            |m| m.info["features"]["observation.state"]["shape"] = json!([4]),
+            "column observation.state, row 0: has 3 values, meta/info.json says 4",
+        ),
         (|m| spoil_action(m, 13, f64::NAN), "column action, row 13 (episode 1, frame 1), entry 0: NaN is not a finite number"),
         (|m| spoil_action(m, 20, f64::INFINITY), "column action, row 20"),
         (|m| spoil_action(m, 3, 1e7), "larger than 1e6, more than learning can square"),
-        (|m| spoil_index(m, 14), "row 14 has [index, episode_index, frame_index] = [15, 1, 2], expected [14, 1, 2]: frames are numbered without a gap"),
-        (|m| m.said_lengths.swap(0, 1), "row 9 has [index, episode_index, frame_index] = [9, 0, 9], expected [9, 1, 0]: meta/episodes says that episode 0 has 9 frames"),
+        (
+            |m| spoil_index(m, 14),
+            "row 14 has [index, episode_index, frame_index] = [15, 1, 2], expected [14, 1, 2]: frames are numbered without a gap",
+        ),
+        (
+            |m| m.said_lengths.swap(0, 1),
+            "row 9 has [index, episode_index, frame_index] = [9, 0, 9], expected [9, 1, 0]: meta/episodes says that episode 0 has 9 frames",
+        ),
         (|m| m.info["total_frames"] = json!(60), "says 6 episodes of 60 frames, meta/episodes has 6 of 59"),
         (|m| m.info["fps"] = json!(0.0), "has 0 frames per second; allowed: 0.1 to 100000"),
     ];
@@ -236,8 +263,14 @@ fn inspect_says_what_it_is() {
     made(&LENGTHS).write(&dir.path().join("d"));
     let (out, _) = done(dir.path(), &["inspect", "d", "--json"]);
     let found: Value = serde_json::from_str(&out).expect("JSON");
-    assert_eq!((&found["kind"], &found["episodes"], &found["frames"]), (&json!("dataset of another program"), &json!(6), &json!(59)));
-    assert_eq!((&found["fps"], &found["tasks"], &found["states"][2]["mean"]), (&json!(10.0), &json!(["hold still"]), &json!(7000.0)));
+    assert_eq!(
+        (&found["kind"], &found["episodes"], &found["frames"]),
+        (&json!("dataset of another program"), &json!(6), &json!(59))
+    );
+    assert_eq!(
+        (&found["fps"], &found["tasks"], &found["states"][2]["mean"]),
+        (&json!(10.0), &json!(["hold still"]), &json!(7000.0))
+    );
     assert!(hilt(dir.path(), &["inspect", "d"]).status.success());
     made(&LENGTHS).without("action").write(&dir.path().join("e"));
     let (out, _) = done(dir.path(), &["inspect", "e"]);
@@ -251,6 +284,10 @@ fn a_policy_of_a_foreign_dataset_is_not_run_in_a_simulator_of_another_task() {
     done(dir.path(), &[&["train", "--method", "bc", "--dataset", &data][..], &TINY].concat());
     let said = refused(dir.path(), &["evaluate", "--task", "stack", "--policy", "runs/lerobot/policy-bc.safetensors"], 1);
     assert!(said.contains("was learned from lerobot, a dataset of another program"), "{said}");
-    let said = refused(dir.path(), &[&["train", "--dataset", &data, "--dynamics", "runs/lerobot/policy-bc.safetensors"][..], &TINY].concat(), 1);
+    let said = refused(
+        dir.path(),
+        &[&["train", "--dataset", &data, "--dynamics", "runs/lerobot/policy-bc.safetensors"][..], &TINY].concat(),
+        1,
+    );
     assert!(said.contains("policy"), "{said}");
 }

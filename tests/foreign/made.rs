@@ -2,6 +2,7 @@
 
 use arrow_array::builder::{Float64Builder, ListBuilder};
 use arrow_array::{ArrayRef, BooleanArray, Float64Array, Int32Array, Int64Array, RecordBatch, StringArray};
+use hilt::math::sin_cos;
 use parquet::arrow::ArrowWriter;
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
@@ -35,8 +36,6 @@ pub const TINY: [&str; 14] = [
 pub struct Made {
     /// `meta/info.json`.
     pub info: Value,
-    /// Frames of each episode.
-    pub lengths: Vec<usize>,
     /// What `meta/episodes` says of them.
     pub said_lengths: Vec<usize>,
     /// Columns of a data file, in order.
@@ -51,9 +50,9 @@ pub fn made(lengths: &[usize]) -> Made {
     let (mut states, mut pushes) = (ListBuilder::new(Float64Builder::new()), Vec::new());
     let mut places: [Vec<i64>; 3] = Default::default();
     for (number, length) in lengths.iter().enumerate() {
-        let (mut x, mut v) = ((number as f64 * 1.7).sin(), 0.0);
+        let (mut x, mut v) = (sin_cos(number as f64 * 1.7).0, 0.0);
         for t in 0..*length {
-            let push = -1.5 * x - v + 0.1 * (3.0 * (t + number) as f64).sin();
+            let push = -1.5 * x - v + 0.1 * sin_cos(3.0 * (t + number) as f64).0;
             states.values().append_slice(&[x, v, 7000.0]);
             states.append(true);
             pushes.push(push);
@@ -89,7 +88,7 @@ pub fn made(lengths: &[usize]) -> Made {
         },
     });
     let columns = columns.into_iter().map(|(name, array)| (name.to_string(), array)).collect();
-    Made { info, lengths: lengths.into(), said_lengths: lengths.into(), columns, group: 7 }
+    Made { info, said_lengths: lengths.into(), columns, group: 7 }
 }
 
 fn places_len(pushes: &[f64]) -> usize {
@@ -98,7 +97,8 @@ fn places_len(pushes: &[f64]) -> usize {
 
 /// Every other episode succeeds at its end.
 fn ends(lengths: &[usize]) -> impl Iterator<Item = bool> {
-    let ends = lengths.iter().enumerate().flat_map(|(number, length)| (0..*length).map(move |t| number % 2 == 0 && t + 1 == *length));
+    let ends =
+        lengths.iter().enumerate().flat_map(|(number, length)| (0..*length).map(move |t| number % 2 == 0 && t + 1 == *length));
     ends.collect::<Vec<_>>().into_iter()
 }
 

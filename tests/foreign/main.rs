@@ -2,3 +2,5 @@
 
 mod learning;
 mod made;
+mod page;
+mod tools;

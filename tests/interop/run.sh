@@ -23,4 +23,5 @@ if ! cmp -s "$here/requirements.txt" "$home/installed.txt"; then
     "$home/venv/bin/pip" install --quiet --disable-pip-version-check --requirement "$here/requirements.txt"
     cp "$here/requirements.txt" "$home/installed.txt"
 fi
+HF_HUB_OFFLINE=1 HF_HOME="$home/huggingface" "$home/venv/bin/python" "$here/foreign.py" "${HILT:-$here/../../target/release/hilt}" "$here/../../fixtures/foreign" "$1/pick-up/dataset/train"
 HF_HUB_OFFLINE=1 HF_HOME="$home/huggingface" exec "$home/venv/bin/python" "$here/run.py" "$1"

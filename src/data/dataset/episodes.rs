@@ -44,15 +44,7 @@ impl<'a> EpisodeTable<'a> {
         let fields: Vec<Field> = fields.iter().map(|(name, array)| Field::new(name, array.data_type().clone(), false)).collect();
         let encoder = Encoder::new(Schema::new(fields), provenance).map_err(|e| parquet_file::cannot_encode(dir, e))?;
         let files = Series::new(dir, EPISODES, &encoder, provenance, sizes.file_bytes);
-        Ok(EpisodeTable {
-            features,
-            encoder,
-            files,
-            rows_at_once: sizes.table_rows,
-            waiting: Vec::new(),
-            episodes: 0,
-            frames: 0,
-        })
+        Ok(EpisodeTable { features, encoder, files, rows_at_once: sizes.table_rows, waiting: Vec::new(), episodes: 0, frames: 0 })
     }
 
     /// Adds an episode, whose frames are in the data file at `place`.

@@ -94,8 +94,11 @@ pub(in crate::data) fn names(spans: &[Span]) -> Vec<String> {
 pub(super) fn features(layout: &Layout) -> Vec<Feature> {
     let (states, actions) = (names(&layout.state), names(&layout.action));
     let (body, world) = states.split_at(proprioception(layout));
-    let vector =
-        |name, names: &[String], doc| Feature { kind: Kind::F32, names: Some(names.to_vec()), ..Feature::of(name, names.len(), doc) };
+    let vector = |name, names: &[String], doc| Feature {
+        kind: Kind::F32,
+        names: Some(names.to_vec()),
+        ..Feature::of(name, names.len(), doc)
+    };
     let scalar = |name, kind, doc| Feature { kind, ..Feature::of(name, 1, doc) };
     vec![
         vector(STATE, body, "joint positions [rad, m], then joint velocities [rad/s, m/s], before the action"),

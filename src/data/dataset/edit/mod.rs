@@ -8,7 +8,7 @@ pub use input::Input;
 pub use rewrite::{Part, Plan, write};
 
 use crate::words::shown;
-use std::collections::BTreeSet;
+use std::collections::{BTreeSet, HashMap};
 
 /// Most numbers that a list of episodes may name.
 const MOST_NAMED: usize = 1_000_000;
@@ -30,6 +30,17 @@ pub fn episodes_of(text: &str) -> Result<BTreeSet<usize>, String> {
         found.extend(from..=to);
     }
     Ok(found)
+}
+
+/// Whether every dataset has this column.
+pub fn is_usual(column: &str) -> bool {
+    input::USUAL.iter().any(|(name, _)| *name == column)
+}
+
+/// The first two inputs of the same content, by their places.
+pub fn same_twice(inputs: &[Input]) -> Option<(usize, usize)> {
+    let mut seen = HashMap::new();
+    inputs.iter().enumerate().find_map(|(at, input)| Some((seen.insert(input.content.to_string(), at)?, at)))
 }
 
 #[cfg(test)]

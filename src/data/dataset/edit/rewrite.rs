@@ -2,7 +2,7 @@
 
 use super::Input;
 use crate::data::dataset::features::{Cells, EPISODE, Feature, INDEX, Kind, TASK, TIMESTAMP, timestamp_at};
-use crate::data::dataset::foreign::{self, Frames};
+use crate::data::dataset::foreign::{self, Frames, STAGE};
 use crate::data::dataset::meta::About;
 use crate::data::dataset::sizes::Sizes;
 use crate::data::dataset::write::{Episode, Filling, Form};
@@ -11,9 +11,6 @@ use crate::error::{Error, Result};
 use crate::interrupt::Interrupt;
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
-
-/// The stage's name.
-const STAGE: &str = "dataset";
 
 /// What is done.
 pub struct Plan {
@@ -45,7 +42,8 @@ pub fn write(out: &Path, inputs: &[Input], plan: &Plan, parts: &[Part], interrup
     let (provenance, about, features) = (provenance(inputs, plan), about(inputs, plan), columns(&inputs[0], plan));
     let form = Form { about, features, provenance: &provenance, interrupt, sizes: Sizes::USUAL };
     let split = parts.iter().any(|part| !part.folder.is_empty());
-    let ours = move |path: &Path| if split { crate::data::dataset::is_file(path) } else { crate::data::dataset::is_root_file(path) };
+    let ours =
+        move |path: &Path| if split { crate::data::dataset::is_file(path) } else { crate::data::dataset::is_root_file(path) };
     atomic::write_dir(out, ours, |dir| {
         let dirs: Vec<PathBuf> = parts.iter().map(|part| dir.join(part.folder)).collect();
         let mut fillings = dirs.iter().map(|dir| Filling::new(&form, dir)).collect::<Result<Vec<_>>>()?;
@@ -72,7 +70,8 @@ fn check(inputs: &[Input], plan: &Plan) -> Result<()> {
     let first = &inputs[0];
     for input in inputs {
         let refuse = |why: String| Err(Error::input(&input.root.path, why));
-        let unwritable: Vec<(&str, &str)> = input.unwritable().filter(|(name, _)| !plan.dropped.iter().any(|d| d == name)).collect();
+        let unwritable: Vec<(&str, &str)> =
+            input.unwritable().filter(|(name, _)| !plan.dropped.iter().any(|d| d == name)).collect();
         if !unwritable.is_empty() {
             let words: Vec<String> = unwritable.iter().map(|(name, dtype)| format!("{name} ({dtype})")).collect();
             let names: Vec<&str> = unwritable.iter().map(|(name, _)| *name).collect();
@@ -116,7 +115,8 @@ fn check(inputs: &[Input], plan: &Plan) -> Result<()> {
 /// The columns that are written.
 fn columns(input: &Input, plan: &Plan) -> Vec<Feature> {
     let kept = input.features.iter().filter(|f| !plan.dropped.iter().any(|name| **name == *f.name));
-    let narrowed = |f: &Feature| Feature { kind: if plan.normalise && f.kind == Kind::F64 { Kind::F32 } else { f.kind }, ..f.clone() };
+    let narrowed =
+        |f: &Feature| Feature { kind: if plan.normalise && f.kind == Kind::F64 { Kind::F32 } else { f.kind }, ..f.clone() };
     kept.map(narrowed).collect()
 }
 

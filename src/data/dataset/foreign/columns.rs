@@ -83,7 +83,10 @@ fn column(info: &Info, name: &str, flag: &str) -> Result<Declared, String> {
     let Some(found) = info.feature(name) else {
         let hint = did_you_mean(name, info.features.iter().map(|feature| feature.name.as_str()));
         let sign = if hint.is_empty() { ";" } else { "" };
-        return Err(format!("has no column {name}{hint}{sign} its columns of numbers are {} (choose with {flag})", numeric(info)));
+        return Err(format!(
+            "has no column {name}{hint}{sign} its columns of numbers are {} (choose with {flag})",
+            numeric(info)
+        ));
     };
     if !found.is_numeric() {
         let (dtype, numeric) = (&found.dtype, numeric(info));

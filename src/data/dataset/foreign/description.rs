@@ -144,7 +144,9 @@ fn wrong_version(version: &str) -> String {
     let shown = shown(version);
     let older = version.starts_with("v2") || version.starts_with("v1");
     let advice = match older {
-        true => "convert it first: python -m lerobot.scripts.convert_dataset_v21_to_v30 --repo-id=NAME --root=DIR --push-to-hub=false",
+        true => {
+            "convert it first: python -m lerobot.scripts.convert_dataset_v21_to_v30 --repo-id=NAME --root=DIR --push-to-hub=false"
+        }
         false => "is it a LeRobotDataset at all, or one of a newer LeRobot?",
     };
     format!("has codebase_version \"{shown}\", hilt reads \"{VERSION}\"; {advice}")
@@ -193,7 +195,8 @@ fn check_template(template: &str) -> std::result::Result<(), String> {
     };
     let one = filled(template, 0, 0).ok_or_else(refuse)?;
     let plain = Path::new(&one).components().all(|part| matches!(part, Component::Normal(_)));
-    let tells = filled(template, 1, 0).is_some_and(|other| other != one) && filled(template, 0, 1).is_some_and(|other| other != one);
+    let tells =
+        filled(template, 1, 0).is_some_and(|other| other != one) && filled(template, 0, 1).is_some_and(|other| other != one);
     if plain && tells { Ok(()) } else { Err(refuse()) }
 }
 

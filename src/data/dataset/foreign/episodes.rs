@@ -54,7 +54,9 @@ pub(in crate::data::dataset) fn below(folder: &Path) -> Result<Vec<PathBuf>> {
 pub(super) fn read(root: &Path, info: &Info) -> Result<Vec<EpisodeRow>> {
     let files = files(root)?;
     if files.is_empty() {
-        let message = format!("has no {EPISODES}/chunk-000/file-000.parquet, which says how long each episode is; write one row an episode");
+        let message = format!(
+            "has no {EPISODES}/chunk-000/file-000.parquet, which says how long each episode is; write one row an episode"
+        );
         return Err(Error::input(root, message));
     }
     let mut rows = Vec::new();

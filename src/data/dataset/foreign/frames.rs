@@ -40,7 +40,8 @@ pub(in crate::data::dataset) fn each(root: &Root, wanted: &[Wanted], see: &mut S
     let mut reading = Reading { root, wanted, see, rows: 0, episode: 0, frame: 0, cells: begun(wanted) };
     for name in root.data_files() {
         if hashes.contains_key(&name) {
-            let message = format!("meta/episodes has episodes of {name} before and after those of another file; put them into their order");
+            let message =
+                format!("meta/episodes has episodes of {name} before and after those of another file; put them into their order");
             return Err(Error::input(&root.path, message));
         }
         let path = root.path.join(&name);
@@ -113,8 +114,9 @@ impl Reading<'_> {
                 return Err(Error::input(path, message));
             };
             let to = batch.num_rows().min(at + length - self.frame);
-            for r in at..to {
-                self.check_place(path, [places[0][r], places[1][r], places[2][r]])?;
+            let [index, episode, frame] = places.each_ref().map(|values| &values[at..to]);
+            for ((index, episode), frame) in index.iter().zip(episode).zip(frame) {
+                self.check_place(path, [*index, *episode, *frame])?;
                 (self.rows, self.frame) = (self.rows + 1, self.frame + 1);
             }
             for ((cells, column), (_, _, width)) in self.cells.iter_mut().zip(&columns).zip(self.wanted) {
@@ -134,11 +136,12 @@ impl Reading<'_> {
             return Ok(());
         }
         let names = PLACES.join(", ");
-        let length = self.root.episodes[self.episode].length;
-        let what = if found[1] != expected[1] {
-            format!("meta/episodes says that episode {} has {length} frames", self.episode)
-        } else {
+        let what = if found[1] == expected[1] {
             "frames are numbered without a gap, in their order".into()
+        } else {
+            // A row too many of the one before, or one too few.
+            let at = if found[1] < expected[1] && self.frame == 0 { self.episode.saturating_sub(1) } else { self.episode };
+            format!("meta/episodes says that episode {at} has {} frames", self.root.episodes[at].length)
         };
         Err(Error::input(path, format!("row {} has [{names}] = {found:?}, expected {expected:?}: {what}", self.rows)))
     }

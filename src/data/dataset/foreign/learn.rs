@@ -76,7 +76,13 @@ impl Source {
         let mut files = BTreeMap::new();
         let mut demos = Vec::new();
         for root in &self.roots {
-            let folder = if self.roots.len() == 1 { "" } else if demos.is_empty() { TRAIN } else { VALIDATION };
+            let folder = if self.roots.len() == 1 {
+                ""
+            } else if demos.is_empty() {
+                TRAIN
+            } else {
+                VALIDATION
+            };
             let (found, hashes) = self.demos(root)?;
             let path = |name: &str| Path::new(folder).join(name).display().to_string();
             files.insert(path(foreign::INFO), root.info.hash);
@@ -159,7 +165,8 @@ impl Source {
         }
         let dim = self.layout.action_dim();
         let actions = columns[states][..steps * dim].to_vec();
-        let executed = if self.columns.executed.is_some() { columns[columns.len() - 1][..steps * dim].to_vec() } else { actions.clone() };
+        let executed =
+            if self.columns.executed.is_some() { columns[columns.len() - 1][..steps * dim].to_vec() } else { actions.clone() };
         Demo::new(&self.layout, all, actions, executed)
             .map_err(|why| Error::input(&root.path, format!("episode {}: {why}", frames.number)))
     }
@@ -170,7 +177,10 @@ impl Source {
             true => format!("larger than {LARGEST_NUMBER:e}, more than learning can square; give it in another unit"),
         };
         let (place, number) = (frames.first + row, frames.number);
-        Error::input(&root.path, format!("column {name}, row {place} (episode {number}, frame {row}), entry {entry}: {value} is {what}"))
+        Error::input(
+            &root.path,
+            format!("column {name}, row {place} (episode {number}, frame {row}), entry {entry}: {value} is {what}"),
+        )
     }
 }
 
@@ -181,11 +191,14 @@ fn wanted(column: &Declared) -> Wanted<'_> {
 
 /// The numbers of columns that were read by [`wanted`].
 fn f32_columns(frames: &Frames) -> Vec<&[f32]> {
-    let values = |cells| match cells {
-        &Cells::F32(ref values) => values.as_slice(),
-        _ => unreachable!("they are read as f32"),
-    };
-    frames.cells.iter().map(values).collect()
+    frames
+        .cells
+        .iter()
+        .map(|cells| match cells {
+            Cells::F32(values) => values.as_slice(),
+            _ => unreachable!("they are read as f32"),
+        })
+        .collect()
 }
 
 /// Training and validation demos of one root.

@@ -11,21 +11,29 @@ mod frames;
 mod learn;
 mod names;
 mod tasks;
+mod validate;
 
 pub use columns::Choice;
 pub(super) use content::{column_order, content};
 pub use described::described;
 pub use description::{Declared, Info};
 pub use episodes::EpisodeRow;
-pub use learn::{Read, Source, open};
 pub(super) use frames::{Frames, each};
+pub use learn::{Read, Source, open};
 pub use names::task_name;
 pub use tasks::instructions;
+pub use validate::problems;
 
+use super::check::DESCRIPTION;
+use super::meta::LAYOUT;
+use crate::data::provenance;
 use crate::error::Result;
 use description::INFO;
 use serde_json::Value;
 use std::path::{Path, PathBuf};
+
+/// The stage that makes datasets of others.
+pub(super) const STAGE: &str = "dataset";
 
 /// A dataset root that has been looked at: its description and its episodes.
 #[derive(Clone, Debug, PartialEq)]
@@ -58,14 +66,23 @@ impl Root {
     }
 }
 
-/// Whether a directory is a dataset that hilt did not write, or holds two of them as `train` and `validation`. One that cannot be read is not.
+/// Whether a directory is a dataset that is not of demos of hilt, or holds two of them as `train` and `validation`: of another program, or made of
+/// such by `hilt dataset`. One that cannot be read is not.
 pub fn is_foreign(dir: &Path) -> bool {
-    [dir.to_path_buf(), dir.join(super::TRAIN)].iter().any(|root| {
-        let text = std::fs::read(root.join(INFO)).ok();
-        let value: Option<Value> = text.and_then(|text| serde_json::from_slice(&text).ok());
-        value.is_some_and(|value| value.is_object() && value.get(crate::data::provenance::KEY).is_none())
+    descriptions(dir).any(|value| match value.get(provenance::KEY) {
+        None => true,
+        Some(hilt) => hilt.get(LAYOUT).is_none() && hilt["provenance"]["stage"] == STAGE,
     })
 }
 
-#[cfg(test)]
-mod tests;
+/// Whether a directory is or holds a dataset that hilt did not write.
+pub fn is_others(dir: &Path) -> bool {
+    descriptions(dir).any(|value| value.get(provenance::KEY).is_none())
+}
+
+/// The descriptions of the dataset in a directory, or of the two in it, as far as they can be read.
+fn descriptions(dir: &Path) -> impl Iterator<Item = Value> {
+    let roots = [dir.to_path_buf(), dir.join(super::TRAIN), dir.join(super::VALIDATION)];
+    let read = |root: PathBuf| serde_json::from_slice::<Value>(&DESCRIPTION.read(&root.join(INFO)).ok()?).ok();
+    roots.into_iter().filter_map(read).filter(Value::is_object)
+}
