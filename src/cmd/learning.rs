@@ -125,18 +125,22 @@ impl Learning {
         Ok(inputs.iter().fold(made, |made, (role, content)| made.with_input(role, content)))
     }
 
-    /// Training and validation demos.
+    /// Training and validation demos. Settings that follow their number are known from here on.
     ///
     /// # Errors
     /// What reading returns; [`Error::Input`] when there is no validation demo (a dataset of one episode has none), or when one is a training
     /// demo too.
-    pub fn demos(&self, args: &SettingsArgs, console: &Console) -> Result<Demos> {
+    pub fn demos(&mut self, args: &SettingsArgs, console: &Console) -> Result<Demos> {
         let dir = &self.dataset;
-        let (demos, advice) = match &self.subject {
+        let (demos, advice) = match &mut self.subject {
             Subject::Task(pipeline) => {
                 (own_demos(dir, pipeline)?, "run hilt convert again, over recordings of which none is there twice")
             }
-            Subject::Dataset(of) => (foreign_demos(&of.0, &of.1, args.seed, console)?, "drop one (hilt dataset drop --episodes)"),
+            Subject::Dataset(of) => {
+                let demos = foreign_demos(&of.0, &of.1, args.seed, console)?;
+                of.0 = of.0.clone().sized(demos.train.iter().map(Demo::len).sum());
+                (demos, "drop one (hilt dataset drop --episodes)")
+            }
         };
         if let Some((t, v)) = dataset::first_shared(&demos.train, &demos.validation) {
             let message = format!(

@@ -32,7 +32,7 @@ pub struct Args {
 }
 
 pub fn run(args: &Args, context: &Context) -> Result<Outcome> {
-    let learning = Learning::of(&args.settings, &args.columns, args.dataset.as_deref(), &[])?;
+    let mut learning = Learning::of(&args.settings, &args.columns, args.dataset.as_deref(), &[])?;
     let out = learning.path_or(args.out.as_deref(), "dynamics.safetensors");
     let (errors, metrics) = (beside(&out, "errors.parquet"), beside(&out, "pretraining.parquet"));
     let places = args.settings.places().read(&learning.dataset).write("--out", &out, Content::Weights(KIND, "pretrain"));

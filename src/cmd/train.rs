@@ -60,8 +60,8 @@ pub struct Args {
 
 pub fn run(args: &Args, context: &Context) -> Result<Outcome> {
     let flags = [("train.rho", args.rho.map(|v| v.to_string())), ("train.alpha", args.alpha.clone())];
-    let learning = Learning::of(&args.settings, &args.columns, args.dataset.as_deref(), &flags)?;
-    let dir = &learning.dataset;
+    let mut learning = Learning::of(&args.settings, &args.columns, args.dataset.as_deref(), &flags)?;
+    let dir = learning.dataset.clone();
     let model = learning.path_or(args.dynamics.as_deref(), "dynamics.safetensors");
     let method = args.method.name();
     // As `make all METHOD=bc` has it: another method replaces no policy of hil.
@@ -80,7 +80,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome> {
         places.write("--out", &out, Content::Weights(KIND, "train")).write("--metrics", &metrics, Content::Table("train"));
     let checkpoint = if args.resume { Content::Own } else { Content::Weights(weights::CHECKPOINT, "train") };
     places.write("the checkpoint", &kept, checkpoint).check(&context.console)?;
-    let (demos, dataset) = needs_demos.then(|| read_demos(&learning, &args.settings, context)).transpose()?.unzip();
+    let (demos, dataset) = needs_demos.then(|| read_demos(&mut learning, &args.settings, context)).transpose()?.unzip();
     let (dynamics, model) = needs_model.then(|| learning.dynamics(&model)).transpose()?.unzip();
     let inputs = [dataset.map(|content| ("dataset", content)), model.map(|content| ("dynamics", content))];
     let inputs: Vec<_> = inputs.into_iter().flatten().collect();
@@ -157,7 +157,7 @@ fn stated(selection: &Selection, episodes: u64, seed: u64) -> Value {
     json!({ "episodes": episodes, "seed": seed, "candidates": selection.candidates, "chosen": selection.best() })
 }
 
-fn read_demos(learning: &Learning, args: &SettingsArgs, context: &Context) -> Result<(Inputs, ContentHash)> {
+fn read_demos(learning: &mut Learning, args: &SettingsArgs, context: &Context) -> Result<(Inputs, ContentHash)> {
     let Demos { train, validation, content } = learning.demos(args, &context.console)?;
     Ok((Inputs::new(train, validation)?, content))
 }

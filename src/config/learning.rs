@@ -17,7 +17,19 @@ pub struct LearningSettings {
     pub pretrain: PretrainSettings,
     /// The policy.
     pub train: TrainSettings,
+    /// Which of [`SIZED`] somebody has set: those stay as they are.
+    said: [bool; SIZED.len()],
 }
+
+/// What follows the number of demos unless it is set: presets are made for some hundred.
+const SIZED: [(&str, &str); 3] = [("pretrain", "batch_rows"), ("train", "warm_start_updates"), ("train", "min_updates")];
+/// Passes of a warm start over the demos: preset best makes 284 over 300 demos of 90 steps, and with few demos ten times as many teach a
+/// policy its demos by heart (docs/notes.md).
+const WARM_START_PASSES: u64 = 300;
+/// Updates of an epoch of pretraining, for which a batch is smaller where there are few transitions.
+const EPOCH_UPDATES: usize = 32;
+/// A smaller batch is all noise.
+const LEAST_BATCH: usize = 32;
 
 /// Where the rows of a dataset are all that is known: no kinematics, and nothing that runs them again.
 const KNOWN: &str = "pretrain.features = \"raw\"\npretrain.structure = \"plain\"\npretrain.reexecute = 0\ntrain.features = \"raw\"\n\
@@ -38,6 +50,12 @@ impl LearningSettings {
         // Presets differ by task; that of none is what a preset does for a task that it does not know.
         let mut table = extended(toml::Table::from_iter([("extends".into(), base), (TASK.into(), "".into())]), &origin)?;
         lay_over(&mut table, KNOWN.parse().expect("these lines are TOML"));
+        let set_here = |section: &str, key: &str| {
+            let in_sets =
+                || sets.iter().any(|set| set.split('=').next().is_some_and(|said| said.trim() == format!("{section}.{key}")));
+            own.get(section).is_some_and(|section| section.get(key).is_some()) || in_sets()
+        };
+        let said = SIZED.map(|(section, key)| set_here(section, key));
         lay_over(&mut table, own);
         table.remove(ROBOT);
         table.remove("scene");
@@ -54,9 +72,26 @@ impl LearningSettings {
             pipeline = check::resolve(table.clone(), &origin)?;
         }
         let Pipeline { convert, pretrain, train, .. } = pipeline;
-        let settings = LearningSettings { convert, pretrain, train };
+        let settings = LearningSettings { convert, pretrain, train, said };
         settings.needs_nothing_else()?;
         Ok(settings)
+    }
+
+    /// The settings for so many transitions to learn from.
+    pub fn sized(mut self, transitions: usize) -> Self {
+        let [batch, warm_start, least] = self.said;
+        if !batch {
+            let fitting = transitions.div_ceil(EPOCH_UPDATES).max(LEAST_BATCH);
+            self.pretrain.batch_rows = self.pretrain.batch_rows.min(fitting);
+        }
+        if !warm_start {
+            let pass = transitions.div_ceil(self.train.bc_batch.max(1)) as u64;
+            self.train.warm_start_updates = self.train.warm_start_updates.min(WARM_START_PASSES * pass);
+        }
+        if !least {
+            self.train.min_updates = 0;
+        }
+        self
     }
 
     /// Refuses what the rows alone cannot give.
@@ -111,6 +146,19 @@ mod tests {
         }
         let best = load(Preset::Best, &[]).expect("settings");
         assert_eq!(best.train.warm_start_updates, TrainSettings::default().warm_start_updates);
+    }
+
+    #[test]
+    fn few_demos_are_passed_over_as_often_as_many_unless_it_is_said() {
+        let of = |transitions: usize, sets: &[&str]| {
+            let settings = load(Preset::Best, sets).expect("settings").sized(transitions);
+            (settings.pretrain.batch_rows, settings.train.warm_start_updates, settings.train.min_updates)
+        };
+        assert_eq!(of(360, &[]), (32, 300, 0));
+        assert_eq!(of(6200, &[]), (194, 3900, 0));
+        assert_eq!(of(1_000_000, &[]), (512, 15_000, 0));
+        let said = ["pretrain.batch_rows=400", "train.warm_start_updates = 9000", "train.min_updates=2000"];
+        assert_eq!(of(360, &said), (400, 9000, 2000));
     }
 
     #[test]
