@@ -5,6 +5,7 @@
 //! layout has no row for. Files are closed at 100 MB, as LeRobot's are: a larger dataset has several of each kind. Training and validation are two roots, each complete with its own statistics, so that nothing of the
 //! validation episodes enters a normalisation. `meta/info.json` lists the content hash of every other file and seals itself.
 
+mod cells;
 mod check;
 pub mod edit;
 mod episode;

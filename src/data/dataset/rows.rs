@@ -1,10 +1,11 @@
 //! Frames on their way back into episodes: the rows of all data files, one after the other.
 
 use super::DatasetEpisode;
+use super::cells::Kind;
 use super::check::{self, Info};
 use super::features::{
-    ACTION, DONE, ENVIRONMENT, EPISODE, EXECUTED, FRAME, Feature, INDEX, Kind, NEXT_ENVIRONMENT, NEXT_STATE, REWARD, SOURCE,
-    STATE, SUCCESS, features, field,
+    ACTION, DONE, ENVIRONMENT, EPISODE, EXECUTED, FRAME, Feature, INDEX, NEXT_ENVIRONMENT, NEXT_STATE, REWARD, SOURCE, STATE,
+    SUCCESS, features, field,
 };
 use crate::data::parquet_file;
 use crate::demo::Demo;

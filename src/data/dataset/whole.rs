@@ -1,7 +1,8 @@
 //! Statistics over all frames of a dataset, exact, in memory that does not grow with it. Sums run along as the frames are written; then the
 //! frames are read again from a scratch file, for the variances and for one digit after the other of the values that quantiles lie between.
 
-use super::features::{Cells, Feature, Kind};
+use super::cells::{Cells, Kind};
+use super::features::Feature;
 use super::scratch::Scratch;
 use super::stats::{LEVELS, NAMES, Stats, neighbours, of_entry};
 use crate::error::Result;

@@ -1,8 +1,9 @@
 //! Writing a dataset: windows of episodes become row groups on all threads and are appended in their order.
 
+use super::cells::Cells;
 use super::episode::{DatasetEpisode, Episodes};
 use super::episodes::{EpisodeTable, Row};
-use super::features::{self, Cells, Feature, features};
+use super::features::{self, Feature, features};
 use super::files::{Encoder, RowGroup, Series};
 use super::meta::{self, About, DATA};
 use super::sizes::Sizes;

@@ -1,6 +1,7 @@
 //! A dataset that others are made of.
 
-use crate::data::dataset::features::{EPISODE, FRAME, Feature, INDEX, Kind, SUCCESS, TASK, TIMESTAMP, features as own_features};
+use crate::data::dataset::cells::Kind;
+use crate::data::dataset::features::{EPISODE, FRAME, Feature, INDEX, SUCCESS, TASK, TIMESTAMP, features as own_features};
 use crate::data::dataset::foreign::{Declared, Root, instructions, is_foreign, task_name};
 use crate::data::dataset::{foreign, read};
 use crate::data::{ContentHash, Provenance};

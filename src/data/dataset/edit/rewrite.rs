@@ -1,7 +1,8 @@
 //! The one loop behind all of it: episodes of the inputs in their order, each into the parts that take it.
 
 use super::Input;
-use crate::data::dataset::features::{Cells, EPISODE, Feature, INDEX, Kind, TASK, TIMESTAMP, timestamp_at};
+use crate::data::dataset::cells::{Cells, Kind};
+use crate::data::dataset::features::{EPISODE, Feature, INDEX, TASK, TIMESTAMP, timestamp_at};
 use crate::data::dataset::foreign::{self, Frames, STAGE};
 use crate::data::dataset::meta::About;
 use crate::data::dataset::sizes::Sizes;

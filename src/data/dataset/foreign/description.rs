@@ -1,8 +1,8 @@
 //! `meta/info.json` of any LeRobotDataset v3.0.
 
 use crate::data::ContentHash;
+use crate::data::dataset::cells::Kind;
 use crate::data::dataset::check::DESCRIPTION;
-use crate::data::dataset::features::Kind;
 use crate::error::{Error, Result};
 use crate::layout::MOST_ENTRIES;
 use crate::words::shown;

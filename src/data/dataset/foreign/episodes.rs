@@ -2,7 +2,7 @@
 
 use super::Info;
 use super::flat;
-use crate::data::dataset::features::{Cells, Kind};
+use crate::data::dataset::cells::{Cells, Kind};
 use crate::data::dataset::meta::EPISODES;
 use crate::data::parquet_stream::Stream;
 use crate::error::{Error, Result};

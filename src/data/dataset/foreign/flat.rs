@@ -1,6 +1,6 @@
 //! Arrow columns of any nesting as plain numbers, row after row.
 
-use crate::data::dataset::features::{Cells, Kind};
+use crate::data::dataset::cells::{Cells, Kind};
 use arrow_array::cast::AsArray;
 use arrow_array::types::{
     ArrowPrimitiveType, Float16Type, Float32Type, Float64Type, Int8Type, Int16Type, Int32Type, Int64Type, UInt8Type, UInt16Type,

@@ -3,7 +3,8 @@
 use super::flat;
 use super::{Info, Root};
 use crate::data::ContentHash;
-use crate::data::dataset::features::{Cells, EPISODE, FRAME, INDEX, Kind};
+use crate::data::dataset::cells::{Cells, Kind};
+use crate::data::dataset::features::{EPISODE, FRAME, INDEX};
 use crate::data::parquet_stream::Stream;
 use crate::error::{Error, Result};
 use arrow_array::RecordBatch;

@@ -4,7 +4,7 @@ use super::columns::{Choice, Columns};
 use super::frames::{self, Frames, Wanted};
 use super::{Declared, Root, task_name};
 use crate::data::ContentHash;
-use crate::data::dataset::features::{Cells, Kind};
+use crate::data::dataset::cells::{Cells, Kind};
 use crate::data::dataset::meta::{TRAIN, VALIDATION};
 use crate::data::dataset::{foreign, split};
 use crate::demo::{Demo, LARGEST_NUMBER};

@@ -2,7 +2,7 @@
 
 use super::episodes::text_values;
 use super::flat;
-use crate::data::dataset::features::{Cells, Kind};
+use crate::data::dataset::cells::{Cells, Kind};
 use crate::data::dataset::meta::TASKS;
 use crate::data::parquet_stream::Stream;
 use crate::error::{Error, Result};
