@@ -26,6 +26,8 @@ pub struct EpisodeRow {
 /// The columns that must be there, in the order of [`append`].
 const NUMBERS: [&str; 4] = ["episode_index", "length", "data/chunk_index", "data/file_index"];
 const TASKS: &str = "tasks";
+/// A longer episode is a damaged file's.
+const LONGEST: i64 = 1 << 40;
 
 /// Paths of the table's files, in order: `chunk-*/file-*.parquet` below its folder.
 pub(in crate::data::dataset) fn files(root: &Path) -> Result<Vec<PathBuf>> {
@@ -99,8 +101,8 @@ fn append(batch: &RecordBatch, rows: &mut Vec<EpisodeRow>) -> std::result::Resul
         let whole = |name: &str, value: i64| {
             usize::try_from(value).map_err(|_| format!("episode {number} has {name} {value}; allowed: from 0"))
         };
-        if length[r] < 1 {
-            return Err(format!("episode {number} has length {}; allowed: from 1", length[r]));
+        if !(1..=LONGEST).contains(&length[r]) {
+            return Err(format!("episode {number} has length {}; allowed: from 1 to {LONGEST}", length[r]));
         }
         rows.push(EpisodeRow {
             length: whole("length", length[r])?,
