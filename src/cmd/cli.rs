@@ -2,7 +2,7 @@
 
 use super::console::Console;
 use super::context::{Context, Outcome};
-use super::{convert, evaluate, experiment, export, inspect, plan, pretrain, render, report, robot, settings, simulate, train};
+use super::{convert, dataset, evaluate, experiment, export, inspect, plan, pretrain, render, report, robot, settings, simulate, train};
 use crate::error::{Error, Result};
 use crate::interrupt::Interrupt;
 use clap::{Parser, Subcommand};
@@ -48,6 +48,7 @@ enum Command {
     Train(train::Args),
     Evaluate(evaluate::Args),
     Inspect(inspect::Args),
+    Dataset(dataset::Args),
     Render(render::Args),
     Settings(settings::Args),
     Experiment(experiment::Args),
@@ -80,6 +81,8 @@ impl Cli {
             Command::Experiment(args) => experiment::run(args, &context),
             Command::Report(args) => report::run(args, &context),
             Command::Export(args) => export::run(args, &context),
+            Command::Dataset(args) if dataset::only_answers(args) => return dataset::run(args, &context),
+            Command::Dataset(args) => dataset::run(args, &context),
             Command::Inspect(args) => return inspect::run(args, &context),
             Command::Render(args) => render::run(args, &context),
             Command::Robot(args) => return robot::run(args, &context),

@@ -1,7 +1,7 @@
 //! The flags that all stages share: which settings, which seed.
 
 use super::places::Places;
-use crate::config::{self, ChosenTask, Pipeline, Preset, Source, Stage};
+use crate::config::{self, ChosenTask, LearningSettings, Pipeline, Preset, Source, Stage};
 use crate::data::{ContentHash, Provenance, weights};
 use crate::error::{Error, Result};
 use crate::layout::Layout;
@@ -13,7 +13,7 @@ use serde_json::Value;
 use std::path::{Path, PathBuf};
 
 /// Where artefacts go unless a flag says otherwise.
-const RUNS: &str = "runs";
+pub const RUNS: &str = "runs";
 
 /// Which settings: a preset of a task or a pipeline file, then `--set`, then flags of the stage.
 #[derive(Debug, clap::Args)]
@@ -42,6 +42,9 @@ pub struct SettingsArgs {
     pub seed: u64,
 }
 
+/// The key of a provenance's settings that says that what was learned from is a dataset of another program, and which columns.
+pub const FOREIGN: &str = "columns";
+
 /// A flag that stands for one setting.
 pub type Flag<'a> = (&'a str, Option<String>);
 
@@ -69,17 +72,35 @@ impl SettingsArgs {
                 return Err(Error::Usage(format!("which task? give --task ({tasks}, or a file) or --pipeline FILE")));
             }
         };
-        let robot = ("robot", self.robot.clone());
-        let given: Vec<(String, String)> = [&robot]
-            .into_iter()
-            .chain(flags)
-            .filter_map(|(key, value)| value.as_ref().map(|v| (format!("{key}={v}"), flag_text(key, v))))
-            .collect();
-        let mut sets = split(self.sets.as_deref().unwrap_or_default());
-        sets.extend(self.set.iter().chain(given.iter().map(|(set, _)| set)).cloned());
+        let (sets, given) = self.overrides([&("robot", self.robot.clone())].into_iter().chain(flags));
         let pipeline = Pipeline::load(&source, &sets).map_err(|e| in_words_of_flags(e, &given))?;
         check_ready_pose(&pipeline.robot, &pipeline.scene)?;
         Ok(pipeline)
+    }
+
+    /// The settings of learning from a dataset of another program in `dir`.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] with a task or a robot; see [`LearningSettings::load`].
+    pub fn resolve_for_dataset(&self, dir: &Path, flags: &[Flag]) -> Result<LearningSettings> {
+        for (flag, said) in [("--task", &self.task), ("--robot", &self.robot)] {
+            if let Some(said) = said {
+                let dir = dir.display();
+                return Err(Error::Usage(format!("{flag} {said}: {dir} is a dataset of another program; leave out {flag}")));
+            }
+        }
+        let (sets, given) = self.overrides(flags.iter());
+        let loaded = LearningSettings::load(self.preset.unwrap_or_default(), self.pipeline.as_deref(), &sets);
+        loaded.map_err(|e| in_words_of_flags(e, &given))
+    }
+
+    /// All overrides in their order, and those that flags stand for with the flags as they were typed.
+    fn overrides<'a>(&self, flags: impl Iterator<Item = &'a Flag<'a>>) -> (Vec<String>, Vec<(String, String)>) {
+        let given: Vec<(String, String)> =
+            flags.filter_map(|(key, value)| value.as_ref().map(|v| (format!("{key}={v}"), flag_text(key, v)))).collect();
+        let mut sets = split(self.sets.as_deref().unwrap_or_default());
+        sets.extend(self.set.iter().chain(given.iter().map(|(set, _)| set)).cloned());
+        (sets, given)
     }
 
     /// What made an artefact of `stage`: the settings it reads, the seed, the hashes of what it has read by role ("plans", "dataset").
@@ -139,6 +160,14 @@ pub fn path_or(given: Option<&Path>, pipeline: &Pipeline, name: &str) -> PathBuf
 /// [`Error::Input`] naming both tasks.
 pub fn same_task(path: &Path, made: &Provenance, pipeline: &Pipeline) -> Result<()> {
     let (theirs, ours) = (&made.task, &pipeline.task.name);
+    if made.settings.get(FOREIGN).is_some() {
+        return Err(Error::input(
+            path,
+            format!(
+                "was learned from {theirs}, a dataset of another program, not from demos of {ours}: hilt has no simulator for it"
+            ),
+        ));
+    }
     if theirs != ours {
         return Err(Error::input(
             path,

@@ -31,6 +31,8 @@ pub enum Content {
     Recordings(&'static str),
     /// A directory with the two datasets.
     Datasets,
+    /// One dataset.
+    Dataset,
     /// A directory with a page, figures and tables.
     Report,
     /// A directory of finished pieces, in which other runs may have theirs: nothing in it is replaced.
@@ -95,6 +97,7 @@ impl Places {
             match content {
                 Content::Recordings(_) => atomic::check_directory(path, recording::is_file)?,
                 Content::Datasets => atomic::check_directory(path, dataset::is_file)?,
+                Content::Dataset => atomic::check_directory(path, dataset::is_root_file)?,
                 Content::Report => atomic::check_directory(path, experiments::is_file)?,
                 Content::Pieces => atomic::check_place(&path.join("a piece"))?,
                 _ => atomic::check_place(path)?,
@@ -170,7 +173,9 @@ fn check_ending(name: &str, path: &Path, content: Content) -> Result<()> {
         Content::Png => ("png", "a PNG picture"),
         Content::Gif => ("gif", "a GIF animation"),
         Content::Log => ("log", "a log"),
-        Content::Recordings(_) | Content::Datasets | Content::Report | Content::Pieces | Content::Own => return Ok(()),
+        Content::Recordings(_) | Content::Datasets | Content::Dataset | Content::Report | Content::Pieces | Content::Own => {
+            return Ok(());
+        }
     };
     if matches!(atomic::target(path)?, Target::Stream(_)) || path.extension() == Some(OsStr::new(ending)) {
         return Ok(());
@@ -190,7 +195,8 @@ fn check_held(name: &str, path: &Path, content: Content) -> Result<()> {
         Content::Onnx => (Format::Onnx, Some(onnx::EXPORT), None),
         Content::Png => (Format::Png, None, None),
         Content::Gif => (Format::Gif, None, None),
-        Content::Log | Content::Datasets | Content::Report | Content::Pieces | Content::Own => return Ok(()),
+        Content::Log | Content::Report | Content::Pieces | Content::Own => return Ok(()),
+        Content::Datasets | Content::Dataset => return check_dataset(name, path),
         Content::Recordings(stage) => return check_recordings(name, path, stage),
     };
     if is_stream(path) || !path.is_file() {
@@ -200,6 +206,17 @@ fn check_held(name: &str, path: &Path, content: Content) -> Result<()> {
     let Some(holds) = differs(&found, format, stage, kind) else { return Ok(()) };
     let path = path.display();
     Err(Error::Usage(format!("{name} {path}: holds {holds}, which would be lost; move it away or choose another name")))
+}
+
+/// A dataset that another program wrote has the same files, but is not hilt's to replace.
+fn check_dataset(name: &str, dir: &Path) -> Result<()> {
+    if !dataset::foreign::is_others(dir) {
+        return Ok(());
+    }
+    let dir = dir.display();
+    Err(Error::Usage(format!(
+        "{name} {dir}: holds a dataset that hilt did not write, which would be lost; choose another directory"
+    )))
 }
 
 /// Recordings in a directory are replaced by recordings of the same stage alone.

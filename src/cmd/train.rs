@@ -1,15 +1,16 @@
 use super::checkpoint::{self, Keeper};
-use super::common::{SettingsArgs, path_or, read_network};
+use super::common::SettingsArgs;
 use super::epochs::Epochs;
+use super::learning::{ColumnArgs, Demos, Learning};
 use super::places::{Content, beside};
-use super::{Console, Context, Outcome, pretrain};
+use super::{Console, Context, Outcome};
 use crate::config::{Pipeline, Stage};
 use crate::data::{ContentHash, atomic, table_file, weights};
 use crate::env::Env;
 use crate::error::Result;
 use crate::eval::{PolicyController, Rollouts};
 use crate::interrupt::Interrupt;
-use crate::learn::{self, BcRl, Checkpoint, Dynamics, Hooks, Inputs, Method, MethodName, Policy, Ppo, Selection, imitator};
+use crate::learn::{self, BcRl, Checkpoint, Hooks, Inputs, Method, MethodName, Policy, Ppo, Selection, imitator};
 use crate::scene::Scene;
 use crate::sim::{Controller, TaskEnv};
 use serde_json::{Value, json};
@@ -26,6 +27,8 @@ pub const KIND: &str = weights::POLICY;
 pub struct Args {
     #[command(flatten)]
     settings: SettingsArgs,
+    #[command(flatten)]
+    columns: ColumnArgs,
     /// Method: hil, bc, sc, ppo or bc-rl
     #[arg(long, value_name = "METHOD", default_value = "hil")]
     method: MethodName,
@@ -35,7 +38,7 @@ pub struct Args {
     /// Weight of state cloning: adaptive, or 0 to 1 [default: train.alpha]
     #[arg(long, value_name = "ALPHA", allow_negative_numbers = true)]
     alpha: Option<String>,
-    /// Directory with the datasets train and validation; ppo needs none [default: runs/<TASK>/dataset]
+    /// Directory with the datasets train and validation, or any LeRobotDataset v3.0 (without --task); ppo needs none [default: runs/<TASK>/dataset]
     #[arg(long, value_name = "DIR")]
     dataset: Option<PathBuf>,
     /// Weights of the dynamics network; bc, ppo and bc-rl need none [default: runs/<TASK>/dynamics.safetensors]
@@ -56,16 +59,19 @@ pub struct Args {
 }
 
 pub fn run(args: &Args, context: &Context) -> Result<Outcome> {
-    let pipeline =
-        args.settings.resolve(&[("train.rho", args.rho.map(|v| v.to_string())), ("train.alpha", args.alpha.clone())])?;
-    let dir = path_or(args.dataset.as_deref(), &pipeline, "dataset");
-    let model = path_or(args.dynamics.as_deref(), &pipeline, "dynamics.safetensors");
+    let flags = [("train.rho", args.rho.map(|v| v.to_string())), ("train.alpha", args.alpha.clone())];
+    let mut learning = Learning::of(&args.settings, &args.columns, args.dataset.as_deref(), &flags)?;
+    let dir = learning.dataset.clone();
+    let model = learning.path_or(args.dynamics.as_deref(), "dynamics.safetensors");
     let method = args.method.name();
     // As `make all METHOD=bc` has it: another method replaces no policy of hil.
     let name = if args.method == MethodName::Hil { "policy.safetensors".into() } else { format!("policy-{method}.safetensors") };
-    let out = path_or(args.out.as_deref(), &pipeline, &name);
+    let out = learning.path_or(args.out.as_deref(), &name);
     let metrics = args.metrics.clone().unwrap_or_else(|| beside(&out, "training.parquet"));
     let needs_demos = args.method.needs_demos();
+    if matches!(args.method, MethodName::Ppo | MethodName::BcRl) {
+        learning.simulated(&format!("--method {method}"))?;
+    }
     let needs_model = args.method.needs_dynamics() || args.method == MethodName::Bc && args.dynamics.is_some();
     let kept = beside(&out, checkpoint::ENDING);
     let read = needs_demos.then_some(dir.as_path()).into_iter().chain(needs_model.then_some(model.as_path()));
@@ -74,29 +80,35 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome> {
         places.write("--out", &out, Content::Weights(KIND, "train")).write("--metrics", &metrics, Content::Table("train"));
     let checkpoint = if args.resume { Content::Own } else { Content::Weights(weights::CHECKPOINT, "train") };
     places.write("the checkpoint", &kept, checkpoint).check(&context.console)?;
-    let (demos, dataset) = needs_demos.then(|| read_demos(&dir, &pipeline)).transpose()?.unzip();
-    let (dynamics, model) = needs_model.then(|| read_dynamics(&model, &pipeline)).transpose()?.unzip();
+    let (demos, dataset) = needs_demos.then(|| read_demos(&mut learning, &args.settings, context)).transpose()?.unzip();
+    let (dynamics, model) = needs_model.then(|| learning.dynamics(&model)).transpose()?.unzip();
     let inputs = [dataset.map(|content| ("dataset", content)), model.map(|content| ("dynamics", content))];
     let inputs: Vec<_> = inputs.into_iter().flatten().collect();
-    let mut provenance = args.settings.provenance(Stage::Train, &pipeline, &inputs)?;
+    let mut provenance = learning.provenance(&args.settings, Stage::Train, &inputs)?;
     provenance.settings["method"] = method.into();
 
     let (console, seed) = (&context.console, args.settings.seed);
     let resume = if args.resume { checkpoint::read(&kept, &provenance)? } else { None };
     announce(console, args.resume, resume.as_ref(), &kept);
     let mut keeper = Keeper::new(&kept, &provenance, console, resume.as_ref());
-    let settings = &pipeline.train;
+    let settings = learning.train();
     let reward = if args.method == MethodName::BcRl { settings.bc_rl.reward } else { settings.ppo.reward };
-    let world = |horizon_steps| -> Result<Box<dyn Env>> { Ok(Box::new(TaskEnv::new(&pipeline, reward, horizon_steps, seed))) };
+    let world = |horizon_steps| -> Result<Box<dyn Env>> {
+        let pipeline = learning.simulated("learning by trial")?;
+        Ok(Box::new(TaskEnv::new(pipeline, reward, horizon_steps, seed)))
+    };
     let learner: Box<dyn Method> = match demos {
-        None => Box::new(Ppo::new(&pipeline.task.layout(&pipeline.robot), settings, seed, world)?),
+        None => {
+            let pipeline = learning.simulated("learning by trial")?;
+            Box::new(Ppo::new(&pipeline.task.layout(&pipeline.robot), settings, seed, world)?)
+        }
         Some(inputs) if args.method == MethodName::BcRl => Box::new(BcRl::new(inputs, settings, seed, world)?),
         Some(inputs) => imitator(args.method, inputs, dynamics, settings, seed)?,
     };
     let mut epochs = Epochs::new(console);
     let hooks = Hooks {
         log: Box::new(|epoch, metrics| epochs.step(epoch, metrics)),
-        score: Box::new(|policy| successes(&pipeline, seed, policy, &context.interrupt)),
+        score: Box::new(|policy| successes(learning.simulated("train.select_episodes")?, seed, policy, &context.interrupt)),
         keep: Box::new(|checkpoint| keeper.keep(checkpoint)),
         keep_every: (args.checkpoint_every > 0).then(|| Duration::from_secs(args.checkpoint_every)),
         resume,
@@ -106,7 +118,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome> {
     epochs.finish();
     let mut meta = trained.policy.meta();
     if let Some(selection) = &trained.selection {
-        meta["selection"] = stated(selection, pipeline.train.select_episodes, seed);
+        meta["selection"] = stated(selection, settings.select_episodes, seed);
     }
     let weights = weights::encode(&out, KIND, &trained.policy.to_tensors(), &meta, &provenance)?;
     let table = table_file::encode(&metrics, &trained.metrics, &provenance)?;
@@ -145,13 +157,7 @@ fn stated(selection: &Selection, episodes: u64, seed: u64) -> Value {
     json!({ "episodes": episodes, "seed": seed, "candidates": selection.candidates, "chosen": selection.best() })
 }
 
-fn read_demos(dir: &Path, pipeline: &Pipeline) -> Result<(Inputs, ContentHash)> {
-    let pretrain::Demos { train, validation, content } = pretrain::demos(dir, pipeline)?;
+fn read_demos(learning: &mut Learning, args: &SettingsArgs, context: &Context) -> Result<(Inputs, ContentHash)> {
+    let Demos { train, validation, content } = learning.demos(args, &context.console)?;
     Ok((Inputs::new(train, validation)?, content))
-}
-
-fn read_dynamics(path: &Path, pipeline: &Pipeline) -> Result<(Dynamics, ContentHash)> {
-    let (dynamics, _, content) =
-        read_network(path, pretrain::KIND, pipeline, Dynamics::from_tensors, |dynamics| dynamics.layout())?;
-    Ok((dynamics, content))
 }

@@ -41,7 +41,7 @@ impl Pipeline {
         let mut pipeline = check::resolve(table.clone(), &origin)?;
         for set in sets {
             let origin = format!("--set {}", shown(set));
-            apply(&mut table, set, &origin)?;
+            put(&mut table, set, &origin)?;
             pipeline = check::resolve(table.clone(), &origin)?;
         }
         Ok(pipeline)
@@ -49,7 +49,7 @@ impl Pipeline {
 }
 
 /// The settings of the preset that a file `extends`, with the file's own over them. A preset may extend another.
-fn extended(mut own: toml::Table, origin: &str) -> Result<toml::Table> {
+pub(super) fn extended(mut own: toml::Table, origin: &str) -> Result<toml::Table> {
     let Some(name) = own.remove("extends") else {
         return Ok(own);
     };
@@ -68,7 +68,7 @@ fn extended(mut own: toml::Table, origin: &str) -> Result<toml::Table> {
 }
 
 /// Puts `own` over `table`, key by key.
-fn lay_over(table: &mut toml::Table, own: toml::Table) {
+pub(super) fn lay_over(table: &mut toml::Table, own: toml::Table) {
     for (key, value) in own {
         match (table.get_mut(&key), value) {
             (Some(toml::Value::Table(inner)), toml::Value::Table(value)) => lay_over(inner, value),
@@ -110,7 +110,7 @@ fn agree_on_task(table: &mut toml::Table, asked: Option<&ChosenTask>, origin: &s
 }
 
 /// Puts one `stage.key=value` into the table. The value is TOML; what is not TOML is taken as text.
-fn apply(table: &mut toml::Table, set: &str, origin: &str) -> Result<()> {
+pub(super) fn put(table: &mut toml::Table, set: &str, origin: &str) -> Result<()> {
     let refuse = |why: String| Err(Error::Usage(format!("{origin}: {why}")));
     let Some((key, value)) = set.split_once('=') else {
         return refuse("expected stage.key=value, for example --set plan.speed=0.5".into());

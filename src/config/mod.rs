@@ -5,6 +5,7 @@ mod bc_rl;
 mod check;
 mod choices;
 mod data;
+mod learning;
 mod limits;
 mod load;
 mod pipeline_file;
@@ -23,6 +24,7 @@ pub use choices::{
     ActionChoice, Alpha, Convergence, FeatureSet, FingerCloning, ModelLoss, Objective, Pairs, StateScale, Structure,
 };
 pub use data::{ConvertSettings, EvaluateSettings};
+pub use learning::LearningSettings;
 pub use load::Source;
 pub use ppo::{PpoSettings, RewardKind};
 pub use preset::Preset;

@@ -2,14 +2,26 @@
 
 use super::budget::Budget;
 use super::thrift::{Value, walk};
+use crate::layout::MOST_ENTRIES;
 use std::borrow::Cow;
 
 /// Bytes at the end of a file: the metadata's length and the format's name.
 const TAIL: u64 = 8;
-/// Entries of a schema, groups included; hilt's widest has some 200, and decoders descend into groups by recursion.
-const MOST_SCHEMA_ENTRIES: usize = 1000;
-/// Numbers of a row in one column; hilt's longest list has 32.
-const MOST_VALUES_OF_A_ROW: i64 = 1000;
+/// How wide a table may be.
+#[derive(Clone, Copy)]
+pub(super) struct Width {
+    /// Entries of a schema, groups included; decoders descend into groups by recursion.
+    schema_entries: usize,
+    /// Numbers of a row in one column.
+    values_of_a_row: i64,
+}
+
+/// Of hilt's own tables: the widest has some 200 entries, the longest list 32 numbers.
+pub(super) const OWN: Width = Width { schema_entries: 1000, values_of_a_row: 1000 };
+/// Of tables of others: LeRobot keeps ten statistics of each column, three entries each, and a picture's may be lists of lists; a row has as many
+/// numbers as a layout may have.
+pub(super) const OF_OTHERS: Width = Width { schema_entries: 20_000, values_of_a_row: MOST_ENTRIES as i64 };
+
 /// Unpacked bytes of a page; hilt's own have a megabyte.
 const MOST_PAGE_BYTES: i64 = 64 << 20;
 /// What a decoder takes for each value: a number and its place.
@@ -54,23 +66,24 @@ pub(super) type Part<'a> = dyn Fn(u64, u64) -> Result<Cow<'a, [u8]>, String> + '
 /// # Errors
 /// Says what does not fit, or is too large.
 pub(super) fn check(bytes: &[u8]) -> Result<usize, String> {
-    check_parts(bytes.len() as u64, &|from, len| Ok(Cow::Borrowed(&bytes[from as usize..(from + len) as usize])))
+    let part = |from, len| Ok(Cow::Borrowed(&bytes[from as usize..(from + len) as usize]));
+    check_parts(bytes.len() as u64, &part, OWN)
 }
 
 /// As [`check`], of a file of `len` bytes that is looked at in parts.
 ///
 /// # Errors
 /// As [`check`]; what `part` says.
-pub(super) fn check_parts(len: u64, part: &Part) -> Result<usize, String> {
+pub(super) fn check_parts(len: u64, part: &Part, width: Width) -> Result<usize, String> {
     let end = len.checked_sub(TAIL).ok_or("it is shorter than its metadata")?;
     let length = metadata_bytes(&part(end, TAIL)?);
     let start = end.checked_sub(length).ok_or_else(|| format!("its metadata would have {length} bytes, the file has {end}"))?;
-    let (chunks, rows) = columns(&part(start, length)?)?;
+    let (chunks, rows) = columns(&part(start, length)?, width.schema_entries)?;
     let mut budget = Budget::new();
     budget.allow_for(len);
     let mut longest_text = 0;
     for chunk in &chunks {
-        let most = rows.get(chunk.group).copied().unwrap_or(0).saturating_mul(MOST_VALUES_OF_A_ROW);
+        let most = rows.get(chunk.group).copied().unwrap_or(0).saturating_mul(width.values_of_a_row);
         if !(0..=most).contains(&chunk.values) {
             return Err(format!("a column has {} values, its rows can have at most {most}", chunk.values));
         }
@@ -90,12 +103,12 @@ pub(super) fn metadata_bytes(tail: &[u8]) -> u64 {
 }
 
 /// The columns of all row groups, and the rows of each group.
-fn columns(metadata: &[u8]) -> Result<(Vec<Chunk>, Vec<i64>), String> {
+fn columns(metadata: &[u8], most_entries: usize) -> Result<(Vec<Chunk>, Vec<i64>), String> {
     let (mut chunks, mut rows) = (Vec::<Chunk>::new(), Vec::<i64>::new());
     walk(metadata, &mut |path, value| {
         match (path, value) {
-            (field::SCHEMA, Value::List(count)) if count > MOST_SCHEMA_ENTRIES => {
-                return Err(format!("its schema has {count} entries, hilt reads at most {MOST_SCHEMA_ENTRIES}"));
+            (field::SCHEMA, Value::List(count)) if count > most_entries => {
+                return Err(format!("its schema has {count} entries, hilt reads at most {most_entries}"));
             }
             (field::ROW_GROUP, Value::Struct) => rows.push(0),
             (field::COLUMN, Value::Struct) => chunks.push(Chunk { group: rows.len().saturating_sub(1), ..Chunk::default() }),

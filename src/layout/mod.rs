@@ -182,9 +182,10 @@ impl Layout {
         first(&self.action, Holds::FingerVelocities)
     }
 
-    /// What counts for entry `i` of an action as a radian a second does, without its sign.
-    pub fn action_unit(&self, i: usize) -> f32 {
-        self.closing_unit(i).abs()
+    /// What counts for entry `i` of an action as a radian a second does, without its sign; `None` for a command of which nothing is known.
+    pub fn action_unit(&self, i: usize) -> Option<f32> {
+        let holds = placed(&self.action).find(|(_, at)| at.contains(&i)).map(|(span, _)| span.holds);
+        (holds != Some(Holds::Commands)).then(|| self.closing_unit(i).abs())
     }
 
     /// The same with its sign: a command above 0 times it closes a finger.
@@ -192,10 +193,14 @@ impl Layout {
         self.action_units.get(i).map_or(1.0, |unit| *unit as f32)
     }
 
-    /// What counts for entry `i` of a state as a radian, a radian a second or a metre does.
-    pub fn state_unit(&self, i: usize) -> f32 {
-        let joint = [self.positions(), self.velocities()].into_iter().find(|joints| joints.contains(&i));
-        joint.map_or(1.0, |joints| self.action_unit(i - joints.start))
+    /// What counts for entry `i` of a state as a radian, a radian a second or a metre does; `None` for a number of which nothing is known.
+    pub fn state_unit(&self, i: usize) -> Option<f32> {
+        let (span, at) = self.state_spans().find(|(_, at)| at.contains(&i))?;
+        match span.holds {
+            Holds::Numbers => None,
+            Holds::JointPositions | Holds::JointVelocities => self.action_unit(i - at.start),
+            _ => Some(1.0),
+        }
     }
 
     /// Objects that may move, each with its first entry.

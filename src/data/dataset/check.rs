@@ -104,7 +104,7 @@ fn layout(path: &Path, task: &str, value: &Value) -> Result<Arc<Layout>> {
 fn check_features(path: &Path, layout: &Layout, declared: Option<&Value>) -> Result<()> {
     let task = &layout.name;
     for Feature { name, kind, width, .. } in features(layout) {
-        let entry = declared.and_then(|d| d.get(name));
+        let entry = declared.and_then(|d| d.get(&*name));
         let entry = entry.ok_or_else(|| Error::input(path, format!("does not declare the feature {name} that {task} has")))?;
         let shape: Vec<usize> = entry.get("shape").and_then(|s| serde_json::from_value(s.clone()).ok()).unwrap_or_default();
         let dtype = entry.get("dtype").and_then(Value::as_str).unwrap_or("none");

@@ -7,7 +7,6 @@ use super::sizes::Sizes;
 use super::stats::{NAMES, Stats};
 use crate::data::{Provenance, parquet_file};
 use crate::error::Result;
-use crate::task::Task;
 use arrow_array::{Array, ArrayRef, Float64Array, Int64Array, ListArray, StringArray};
 use arrow_buffer::OffsetBuffer;
 use arrow_schema::{Field, Schema};
@@ -18,13 +17,14 @@ use std::sync::Arc;
 pub(super) struct Row {
     /// Its number of frames.
     pub(super) length: usize,
+    /// What it shows, in words.
+    pub(super) tasks: Vec<String>,
     /// Of each feature.
     pub(super) stats: Vec<Stats>,
 }
 
 /// The table as it is written.
 pub(super) struct EpisodeTable<'a> {
-    task: &'a Task,
     features: &'a [Feature],
     encoder: Encoder,
     files: Series<'a>,
@@ -39,27 +39,12 @@ pub(super) struct EpisodeTable<'a> {
 
 impl<'a> EpisodeTable<'a> {
     /// An empty one below `dir`.
-    pub(super) fn new(
-        dir: &'a Path,
-        task: &'a Task,
-        features: &'a [Feature],
-        provenance: &'a Provenance,
-        sizes: Sizes,
-    ) -> Result<Self> {
-        let fields = columns(task, features, &[], (0, 0), Place::FIRST);
+    pub(super) fn new(dir: &'a Path, features: &'a [Feature], provenance: &'a Provenance, sizes: Sizes) -> Result<Self> {
+        let fields = columns(features, &[], (0, 0), Place::FIRST);
         let fields: Vec<Field> = fields.iter().map(|(name, array)| Field::new(name, array.data_type().clone(), false)).collect();
         let encoder = Encoder::new(Schema::new(fields), provenance).map_err(|e| parquet_file::cannot_encode(dir, e))?;
         let files = Series::new(dir, EPISODES, &encoder, provenance, sizes.file_bytes);
-        Ok(EpisodeTable {
-            task,
-            features,
-            encoder,
-            files,
-            rows_at_once: sizes.table_rows,
-            waiting: Vec::new(),
-            episodes: 0,
-            frames: 0,
-        })
+        Ok(EpisodeTable { features, encoder, files, rows_at_once: sizes.table_rows, waiting: Vec::new(), episodes: 0, frames: 0 })
     }
 
     /// Adds an episode, whose frames are in the data file at `place`.
@@ -78,7 +63,7 @@ impl<'a> EpisodeTable<'a> {
 
     fn flush(&mut self) -> Result<()> {
         let rows = std::mem::take(&mut self.waiting);
-        let columns = columns(self.task, self.features, &rows, (self.episodes, self.frames), self.files.place());
+        let columns = columns(self.features, &rows, (self.episodes, self.frames), self.files.place());
         let group = self.encoder.encode(columns.into_iter().map(|(_, array)| array).collect());
         self.files.append(group.map_err(|e| self.files.cannot_encode(e))?)?;
         self.episodes += rows.len();
@@ -89,7 +74,6 @@ impl<'a> EpisodeTable<'a> {
 
 /// The columns of a row group, after so many `episodes` and `frames` in others; it goes into the file at `here`.
 fn columns(
-    task: &Task,
     features: &[Feature],
     rows: &[(Place, Row)],
     (episodes, frames): (usize, usize),
@@ -99,7 +83,8 @@ fn columns(
         let values = rows.iter().enumerate().map(|(i, row)| value(i, row) as i64);
         (name.to_string(), Arc::new(values.collect::<Int64Array>()) as ArrayRef)
     };
-    let tasks: ArrayRef = Arc::new(StringArray::from(vec![task.instruction.as_str(); rows.len()]));
+    let tasks: ArrayRef = Arc::new(StringArray::from_iter_values(rows.iter().flat_map(|(_, row)| &row.tasks)));
+    let tasks = lists_of(rows.iter().map(|(_, row)| row.tasks.len()), tasks);
     let mut frame = frames;
     let ends: Vec<usize> = rows
         .iter()
@@ -110,7 +95,7 @@ fn columns(
         .collect();
     let mut columns = vec![
         int("episode_index", &|i, _| episodes + i),
-        ("tasks".to_string(), lists(1, tasks)),
+        ("tasks".to_string(), tasks),
         int("length", &|_, (_, row)| row.length),
         int("data/chunk_index", &|_, (place, _)| place.chunk),
         int("data/file_index", &|_, (place, _)| place.file),
@@ -133,7 +118,12 @@ fn columns(
 
 /// A column of lists with `width` values each.
 fn lists(width: usize, values: ArrayRef) -> ArrayRef {
+    lists_of(std::iter::repeat_n(width, values.len() / width), values)
+}
+
+/// A column of lists of these lengths.
+fn lists_of(lengths: impl Iterator<Item = usize>, values: ArrayRef) -> ArrayRef {
     let item = Arc::new(Field::new_list_field(values.data_type().clone(), true));
-    let offsets = OffsetBuffer::from_lengths(std::iter::repeat_n(width, values.len() / width));
+    let offsets = OffsetBuffer::from_lengths(lengths.collect::<Vec<_>>());
     Arc::new(ListArray::new(item, offsets, values, None))
 }

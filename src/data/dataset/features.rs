@@ -1,10 +1,11 @@
 //! The columns of a dataset: names, shapes, and how an episode fills them.
 
+use super::cells::{Cells, Kind};
 use super::episode::DatasetEpisode;
 use crate::layout::{Layout, Span};
 use crate::state::CONTROL_HZ;
-use arrow_array::{ArrayRef, BooleanArray, FixedSizeListArray, Float32Array, Int64Array};
 use arrow_schema::{DataType, Field, Metadata};
+use std::borrow::Cow;
 use std::sync::Arc;
 
 pub(super) const STATE: &str = "observation.state";
@@ -24,47 +25,23 @@ pub(super) const INDEX: &str = "index";
 pub(super) const TASK: &str = "task_index";
 pub(super) const SOURCE: &str = "source_episode";
 
-/// Type of a column's numbers.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum Kind {
-    F32,
-    I64,
-    Bool,
-}
-
-impl Kind {
-    /// LeRobot's name of it.
-    pub(super) fn dtype(self) -> &'static str {
-        match self {
-            Kind::F32 => "float32",
-            Kind::I64 => "int64",
-            Kind::Bool => "bool",
-        }
-    }
-
-    /// The number of a key of [`Cells::for_each`].
-    pub(super) fn value(self, key: u64) -> f64 {
-        match self {
-            Kind::F32 => f64::from(f32::from_bits(if key & F32_SIGN == 0 { !(key as u32) } else { (key ^ F32_SIGN) as u32 })),
-            Kind::I64 => (key ^ I64_SIGN) as i64 as f64,
-            Kind::Bool => key as f64,
-        }
-    }
-}
-
-/// Bits of the sign.
-const F32_SIGN: u64 = 1 << 31;
-const I64_SIGN: u64 = 1 << 63;
-
 /// A column: `width` numbers a row; a scalar when that is 1.
 #[derive(Clone, Debug)]
 pub(super) struct Feature {
-    pub(super) name: &'static str,
+    pub(super) name: Cow<'static, str>,
     pub(super) kind: Kind,
     pub(super) width: usize,
     /// Names with units of the entries of a vector.
     pub(super) names: Option<Vec<String>>,
+    /// Empty where there is nothing to say.
     pub(super) doc: &'static str,
+}
+
+impl Feature {
+    /// So many f32 a row.
+    fn of(name: &'static str, width: usize, doc: &'static str) -> Self {
+        Feature { name: name.into(), kind: Kind::F32, width, names: None, doc }
+    }
 }
 
 /// Entries of `observation.state`: joint positions and velocities.
@@ -81,9 +58,12 @@ pub(in crate::data) fn names(spans: &[Span]) -> Vec<String> {
 pub(super) fn features(layout: &Layout) -> Vec<Feature> {
     let (states, actions) = (names(&layout.state), names(&layout.action));
     let (body, world) = states.split_at(proprioception(layout));
-    let vector =
-        |name, names: &[String], doc| Feature { name, kind: Kind::F32, width: names.len(), names: Some(names.to_vec()), doc };
-    let scalar = |name, kind, doc| Feature { name, kind, width: 1, names: None, doc };
+    let vector = |name, names: &[String], doc| Feature {
+        kind: Kind::F32,
+        names: Some(names.to_vec()),
+        ..Feature::of(name, names.len(), doc)
+    };
+    let scalar = |name, kind, doc| Feature { kind, ..Feature::of(name, 1, doc) };
     vec![
         vector(STATE, body, "joint positions [rad, m], then joint velocities [rad/s, m/s], before the action"),
         vector(ENVIRONMENT, world, "pose of the block [m, unit quaternion], then the task's constants (goal or base block)"),
@@ -103,85 +83,11 @@ pub(super) fn features(layout: &Layout) -> Vec<Feature> {
     ]
 }
 
-/// Values of a column, row-major.
-#[derive(Clone, Debug, PartialEq)]
-pub(super) enum Cells {
-    F32(Vec<f32>),
-    I64(Vec<i64>),
-    Bool(Vec<bool>),
-}
-
-impl Cells {
-    /// As f64, flags as 0 and 1.
-    pub(super) fn to_f64(&self) -> Vec<f64> {
-        match self {
-            Cells::F32(v) => v.iter().map(|x| f64::from(*x)).collect(),
-            Cells::I64(v) => v.iter().map(|x| *x as f64).collect(),
-            Cells::Bool(v) => v.iter().map(|x| f64::from(u8::from(*x))).collect(),
-        }
-    }
-
-    /// Number of values.
-    pub(super) fn len(&self) -> usize {
-        match self {
-            Cells::F32(v) => v.len(),
-            Cells::I64(v) => v.len(),
-            Cells::Bool(v) => v.len(),
-        }
-    }
-
-    /// Shows every value, column by column, with its place in its row of `width` and with a key that sorts as the values do.
-    pub(super) fn for_each(&self, width: usize, mut take: impl FnMut(usize, f64, u64)) {
-        let key = |x: f32| u64::from(if x.is_sign_negative() { !x.to_bits() } else { x.to_bits() | F32_SIGN as u32 });
-        match self {
-            Cells::F32(v) => by_column(v, width, |at, x| take(at, f64::from(x), key(x))),
-            Cells::I64(v) => by_column(v, width, |at, x| take(at, x as f64, x as u64 ^ I64_SIGN)),
-            Cells::Bool(v) => by_column(v, width, |at, x| take(at, f64::from(u8::from(x)), u64::from(x))),
-        }
-    }
-
-    /// Adds the values to `bytes`, which [`Cells::of_bytes`] reads.
-    pub(super) fn push_bytes(&self, bytes: &mut Vec<u8>) {
-        match self {
-            Cells::F32(v) => v.iter().for_each(|x| bytes.extend(x.to_le_bytes())),
-            Cells::I64(v) => v.iter().for_each(|x| bytes.extend(x.to_le_bytes())),
-            Cells::Bool(v) => v.iter().for_each(|x| bytes.push(u8::from(*x))),
-        }
-    }
-
-    /// The inverse of [`Cells::push_bytes`].
-    pub(super) fn of_bytes(kind: Kind, bytes: &[u8]) -> Self {
-        match kind {
-            Kind::F32 => Cells::F32(bytes.as_chunks().0.iter().map(|b| f32::from_le_bytes(*b)).collect()),
-            Kind::I64 => Cells::I64(bytes.as_chunks().0.iter().map(|b| i64::from_le_bytes(*b)).collect()),
-            Kind::Bool => Cells::Bool(bytes.iter().map(|b| *b != 0).collect()),
-        }
-    }
-
-    /// As an Arrow column of `width` numbers a row.
-    pub(super) fn to_array(&self, width: usize) -> ArrayRef {
-        let flat: ArrayRef = match self {
-            Cells::F32(v) => Arc::new(Float32Array::from(v.clone())),
-            Cells::I64(v) => Arc::new(Int64Array::from(v.clone())),
-            Cells::Bool(v) => Arc::new(BooleanArray::from(v.clone())),
-        };
-        if width == 1 {
-            return flat;
-        }
-        let item = Arc::new(Field::new_list_field(flat.data_type().clone(), true));
-        Arc::new(FixedSizeListArray::new(item, width as i32, flat, None))
-    }
-}
-
-/// One column after the other.
-fn by_column<T: Copy>(values: &[T], width: usize, mut take: impl FnMut(usize, T)) {
-    (0..width).for_each(|at| values.iter().skip(at).step_by(width).for_each(|x| take(at, *x)));
-}
-
 /// The Arrow field of a feature, its description and names in the metadata.
 pub(super) fn field(feature: &Feature) -> Field {
     let item = match feature.kind {
         Kind::F32 => DataType::Float32,
+        Kind::F64 => DataType::Float64,
         Kind::I64 => DataType::Int64,
         Kind::Bool => DataType::Boolean,
     };
@@ -189,11 +95,14 @@ pub(super) fn field(feature: &Feature) -> Field {
         1 => item,
         width => DataType::FixedSizeList(Arc::new(Field::new_list_field(item, true)), width as i32),
     };
-    let mut metadata = Metadata::new().with("doc", feature.doc);
+    let mut metadata = Metadata::new();
+    if !feature.doc.is_empty() {
+        metadata.insert("doc", feature.doc);
+    }
     if let Some(names) = &feature.names {
         metadata.insert("names", names.join(","));
     }
-    Field::new(feature.name, kind, false).with_metadata(metadata)
+    Field::new(feature.name.as_ref(), kind, false).with_metadata(metadata)
 }
 
 /// The columns of one episode. `number` is its place in the dataset, `first` that of its first frame.
@@ -206,7 +115,7 @@ pub(super) fn cells(features: &[Feature], episode: &DatasetEpisode, number: usiz
     };
     let each = |value: fn(usize, usize) -> i64, offset: usize| Cells::I64((0..t_end).map(|t| value(t, offset)).collect());
     let at_end = |flag: bool| Cells::Bool((0..t_end).map(|t| flag && t + 1 == t_end).collect());
-    let fill = |feature: &Feature| match feature.name {
+    let fill = |feature: &Feature| match feature.name.as_ref() {
         STATE => part(0, false),
         ENVIRONMENT => part(0, true),
         NEXT_STATE => part(1, false),
@@ -228,6 +137,11 @@ pub(super) fn cells(features: &[Feature], episode: &DatasetEpisode, number: usiz
 }
 
 /// Time of a frame since the start of its episode \[s\].
-pub(super) fn timestamp(frame: usize) -> f32 {
-    (frame as f64 / f64::from(CONTROL_HZ)) as f32
+fn timestamp(frame: usize) -> f32 {
+    timestamp_at(frame, f64::from(CONTROL_HZ))
+}
+
+/// The same at another rate \[Hz\].
+pub(super) fn timestamp_at(frame: usize, fps: f64) -> f32 {
+    (frame as f64 / fps) as f32
 }

@@ -6,9 +6,6 @@ use super::stats::{NAMES, Stats};
 use crate::data::{Provenance, atomic, parquet_file, seal};
 use crate::error::Result;
 use crate::layout::Layout;
-use crate::robot::Robot;
-use crate::state::CONTROL_HZ;
-use crate::task::Task;
 use arrow_array::{ArrayRef, Int64Array, RecordBatch, StringArray};
 use arrow_schema::{Field, Metadata, Schema};
 use parquet::errors::ParquetError;
@@ -51,11 +48,23 @@ fn put(dir: &Path, name: &str, bytes: &[u8], files: &mut BTreeMap<String, String
     atomic::write_new(&dir.join(name), bytes)
 }
 
+/// What a dataset is, beside its columns.
+pub(super) struct About {
+    /// Who did it.
+    pub(super) robot_type: Option<String>,
+    /// Frames per second.
+    pub(super) fps: f64,
+    /// The instructions of its tasks, in the order of their numbers.
+    pub(super) tasks: Vec<String>,
+    /// What the rows of hilt's own hold.
+    pub(super) layout: Option<Arc<Layout>>,
+}
+
 /// Writes what is known when all frames are written: of so many `episodes` and `frames`, with statistics over the `whole`, in `files`
 /// with these hashes.
 pub(super) fn write(
     dir: &Path,
-    (robot, task, layout): (&Robot, &Task, &Layout),
+    about: &About,
     features: &[Feature],
     (episodes, frames): (usize, usize),
     whole: &[Stats],
@@ -63,24 +72,28 @@ pub(super) fn write(
     files: impl IntoIterator<Item = (String, String)>,
 ) -> Result<()> {
     let mut files = files.into_iter().collect();
-    let tasks = task_table(task).map_err(ParquetError::from).and_then(|batch| parquet_file::of_batch(&batch, provenance));
+    let tasks = task_table(&about.tasks).map_err(ParquetError::from).and_then(|batch| parquet_file::of_batch(&batch, provenance));
     put(dir, TASKS, &tasks.map_err(|e| parquet_file::cannot_encode(&dir.join(TASKS), e))?, &mut files)?;
     put(dir, STATS, &pretty(&whole_stats(features, whole)), &mut files)?;
+    let mut hilt = json!({ "files": files, "provenance": provenance, "seal": seal::blank() });
+    if let Some(layout) = &about.layout {
+        hilt[LAYOUT] = json!(**layout);
+    }
     let info = Info {
         codebase_version: CODEBASE_VERSION,
-        robot_type: &robot.name,
+        robot_type: about.robot_type.as_deref(),
         total_episodes: episodes,
         total_frames: frames,
-        total_tasks: 1,
+        total_tasks: about.tasks.len(),
         chunks_size: FILES_PER_CHUNK,
         data_files_size_in_mb: DATA_FILE_MB,
         video_files_size_in_mb: VIDEO_FILE_MB,
-        fps: CONTROL_HZ,
+        fps: if about.fps.fract() == 0.0 { json!(about.fps as u64) } else { json!(about.fps) },
         splits: json!({ "train": format!("0:{episodes}") }),
         data_path: DATA_PATH,
         video_path: None,
         features: InOrder(features.iter().map(|f| (f.name.to_string(), describe(f))).collect()),
-        hilt: json!({ (LAYOUT): layout, "files": files, "provenance": provenance, "seal": seal::blank() }),
+        hilt,
     };
     atomic::write_new(&dir.join(INFO), &seal::close(pretty(&info)))
 }
@@ -89,14 +102,14 @@ pub(super) fn write(
 #[derive(Serialize)]
 struct Info<'a> {
     codebase_version: &'static str,
-    robot_type: &'a str,
+    robot_type: Option<&'a str>,
     total_episodes: usize,
     total_frames: usize,
     total_tasks: usize,
     chunks_size: usize,
     data_files_size_in_mb: usize,
     video_files_size_in_mb: usize,
-    fps: u32,
+    fps: Value,
     splits: Value,
     data_path: &'static str,
     video_path: Option<&'static str>,
@@ -136,7 +149,7 @@ fn whole_stats(features: &[Feature], whole: &[Stats]) -> Map<String, Value> {
 }
 
 /// `meta/tasks.parquet`. LeRobot looks tasks up in the pandas index, which pandas finds by this metadata of the Arrow schema.
-fn task_table(task: &Task) -> std::result::Result<RecordBatch, arrow_schema::ArrowError> {
+fn task_table(tasks: &[String]) -> std::result::Result<RecordBatch, arrow_schema::ArrowError> {
     let column = |name: &str, pandas: &str, numpy: &str| json!({ "name": name, "field_name": name, "pandas_type": pandas, "numpy_type": numpy, "metadata": null });
     let index = json!({ "name": null, "field_name": null, "pandas_type": "unicode", "numpy_type": "object", "metadata": { "encoding": "UTF-8" } });
     let pandas = json!({
@@ -147,8 +160,8 @@ fn task_table(task: &Task) -> std::result::Result<RecordBatch, arrow_schema::Arr
         "pandas_version": "2.2.3",
     });
     let columns = vec![
-        ("task_index", Arc::new(Int64Array::from(vec![0])) as ArrayRef),
-        ("task", Arc::new(StringArray::from(vec![task.instruction.as_str()]))),
+        ("task_index", Arc::new(Int64Array::from_iter_values(0..tasks.len() as i64)) as ArrayRef),
+        ("task", Arc::new(StringArray::from_iter_values(tasks))),
     ];
     let fields: Vec<Field> = columns.iter().map(|(name, array)| Field::new(*name, array.data_type().clone(), false)).collect();
     let schema = Schema::new_with_metadata(fields, Metadata::new().with("pandas", pandas.to_string()));

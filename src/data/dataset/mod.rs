@@ -5,11 +5,14 @@
 //! layout has no row for. Files are closed at 100 MB, as LeRobot's are: a larger dataset has several of each kind. Training and validation are two roots, each complete with its own statistics, so that nothing of the
 //! validation episodes enters a normalisation. `meta/info.json` lists the content hash of every other file and seals itself.
 
+mod cells;
 mod check;
+pub mod edit;
 mod episode;
 mod episodes;
 mod features;
 mod files;
+pub mod foreign;
 mod meta;
 mod read;
 mod rows;
@@ -85,6 +88,11 @@ pub fn write_split<'a>(
         }
         Ok(())
     })
+}
+
+/// Whether a path below one dataset's root is one of it.
+pub fn is_root_file(path: &Path) -> bool {
+    meta::is_file(path)
 }
 
 /// Whether a path below the two datasets is one of theirs.

@@ -1,10 +1,11 @@
 //! Frames on their way back into episodes: the rows of all data files, one after the other.
 
 use super::DatasetEpisode;
+use super::cells::Kind;
 use super::check::{self, Info};
 use super::features::{
-    ACTION, DONE, ENVIRONMENT, EPISODE, EXECUTED, FRAME, Feature, INDEX, Kind, NEXT_ENVIRONMENT, NEXT_STATE, REWARD, SOURCE,
-    STATE, SUCCESS, features, field,
+    ACTION, DONE, ENVIRONMENT, EPISODE, EXECUTED, FRAME, Feature, INDEX, NEXT_ENVIRONMENT, NEXT_STATE, REWARD, SOURCE, STATE,
+    SUCCESS, features, field,
 };
 use crate::data::parquet_file;
 use crate::demo::Demo;
@@ -105,7 +106,7 @@ impl<F: FnMut(DatasetEpisode)> Rows<F> {
     }
 
     fn check_column(&self, path: &Path, batch: &RecordBatch, feature: &Feature) -> Result<()> {
-        let (name, width, task) = (feature.name, feature.width, &self.layout.name);
+        let (name, width, task) = (feature.name.as_ref(), feature.width, &self.layout.name);
         let wrong = |what: String| Error::input(path, format!("column {name} {what}"));
         let column = batch.column_by_name(name).ok_or_else(|| wrong("is missing".into()))?;
         let expected = field(feature);

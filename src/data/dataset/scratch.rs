@@ -1,6 +1,6 @@
 //! Frames that are read more than once while a dataset is written.
 
-use super::features::{Cells, Kind};
+use super::cells::{Cells, Kind};
 use crate::error::{Error, Result};
 use std::fs::File;
 use std::io::Write;

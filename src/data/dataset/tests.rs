@@ -22,7 +22,7 @@ fn fill(dir: &Path, episodes: &Episodes, change: impl Fn(&mut Sizes)) -> Result<
     let (provenance, interrupt) = (Provenance::new("convert", "pick-up", serde_json::json!({}), 0), Interrupt::default());
     let (robot, task) = (paper_robot(), pick_up());
     let mut content = Content::new((&robot, &task), &provenance, &interrupt);
-    change(&mut content.sizes);
+    change(&mut content.form.sizes);
     content.fill(dir, episodes)
 }
 

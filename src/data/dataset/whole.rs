@@ -1,7 +1,8 @@
 //! Statistics over all frames of a dataset, exact, in memory that does not grow with it. Sums run along as the frames are written; then the
 //! frames are read again from a scratch file, for the variances and for one digit after the other of the values that quantiles lie between.
 
-use super::features::{Cells, Feature, Kind};
+use super::cells::{Cells, Kind};
+use super::features::Feature;
 use super::scratch::Scratch;
 use super::stats::{LEVELS, NAMES, Stats, neighbours, of_entry};
 use crate::error::Result;
@@ -206,10 +207,11 @@ mod tests {
 
     /// The statistics by passes, of windows of a few rows.
     fn by_passes(cells: &Cells, kind: Kind, width: usize) -> Stats {
-        let (features, dir) = ([Feature { name: "any", kind, width, names: None, doc: "" }], std::env::temp_dir());
+        let (features, dir) = ([Feature { name: "any".into(), kind, width, names: None, doc: "" }], std::env::temp_dir());
         let mut whole = Whole::new(&features, &dir).expect("a scratch file");
         let windows: Vec<Cells> = match cells {
             Cells::F32(v) => v.chunks(width * 100).map(|part| Cells::F32(part.to_vec())).collect(),
+            Cells::F64(v) => v.chunks(width * 100).map(|part| Cells::F64(part.to_vec())).collect(),
             Cells::I64(v) => v.chunks(width * 100).map(|part| Cells::I64(part.to_vec())).collect(),
             Cells::Bool(v) => v.chunks(width * 100).map(|part| Cells::Bool(part.to_vec())).collect(),
         };
@@ -230,6 +232,7 @@ mod tests {
             let cases = [
                 (Cells::F32(mixed.collect()), Kind::F32, 3),
                 (Cells::F32(vec![0.1; rows]), Kind::F32, 1),
+                (Cells::F64((0..rows).map(|i| [1e300, -0.0, -1e-300, 0.1, f64::MIN][i % 5]).collect()), Kind::F64, 1),
                 (Cells::F32(vec![-0.0; rows]), Kind::F32, 1),
                 (Cells::I64((0..rows as i64).rev().collect()), Kind::I64, 1),
                 (Cells::I64((0..rows).map(|i| [i64::MIN, i64::MAX, 5][i % 3]).collect()), Kind::I64, 1),

@@ -1,8 +1,10 @@
 //! A dataset, described in the memory of one of its files.
 
 use super::answer::answer;
+use super::foreign;
 use super::statistics::{Columns, statistics};
 use crate::data::dataset;
+use crate::data::dataset::foreign::is_foreign;
 use crate::error::{Error, Result};
 use crate::task::built_in;
 use serde_json::{Value, json};
@@ -10,6 +12,9 @@ use std::path::Path;
 
 /// One root.
 pub(super) fn one(root: &Path) -> Result<Value> {
+    if is_foreign(root) {
+        return foreign::one(root);
+    }
     let (mut lengths, mut successes, mut sources) = (Vec::new(), 0, Vec::new());
     let [mut states, mut actions, mut executed] = [const { Columns::NONE }; 3];
     let found = dataset::each(root, |episode| {

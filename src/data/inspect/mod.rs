@@ -2,6 +2,7 @@
 
 mod answer;
 mod datasets;
+mod foreign;
 mod recordings;
 mod statistics;
 mod tables;

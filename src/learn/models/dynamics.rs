@@ -16,7 +16,8 @@ use std::sync::Arc;
 
 /// Spread of an action below which it counts as constant \[rad/s\].
 const ACTION_FLOOR_RAD_S: f32 = 0.01;
-/// Spread of a change in one step below which it counts as noise (0.1 mm, 0.1 mrad, 0.1 mrad/s).
+/// Spread of a change in one step below which it counts as noise (0.1 mm, 0.1 mrad, 0.1 mrad/s; where the unit is not known, this share of the
+/// state's own spread).
 pub const STEP_FLOOR: f32 = 1e-4;
 
 /// What an entry of a state is known to become in a control step, before anything is learned.
@@ -70,7 +71,7 @@ impl Dynamics {
             action: Scaling::fit(
                 corpus.rows(),
                 action_dim,
-                |i| ACTION_FLOOR_RAD_S * layout.action_unit(i),
+                |i| layout.action_unit(i).map_or(0.0, |unit| ACTION_FLOOR_RAD_S * unit),
                 |r, row| row.copy_from_slice(corpus.executed(r)),
             ),
             residual: Scaling { mean: vec![0.0; changing], std: vec![1.0; changing] },
@@ -80,7 +81,7 @@ impl Dynamics {
         dynamics.residual = Scaling::fit(
             corpus.rows(),
             changing,
-            |i| STEP_FLOOR * layout.state_unit(i),
+            |i| STEP_FLOOR * layout.state_unit(i).unwrap_or(dynamics.features.state_scaling().std[i]),
             |r, row| {
                 let (state, action, next) = (corpus.state(r), corpus.executed(r), corpus.next(r));
                 row.iter_mut().enumerate().for_each(|(i, v)| *v = next[i] - dynamics.known_next(i, state[i], |k| action[k]));

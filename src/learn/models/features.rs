@@ -39,7 +39,12 @@ impl Features {
         let (layout, width) = (&corpus.layout, derived_width(&corpus.layout, set));
         let state = |r: usize, row: &mut [f32]| row.copy_from_slice(corpus.state(r));
         let derived = |r: usize, row: &mut [f32]| row.copy_from_slice(corpus.relations(r));
-        let state = Scaling::fit(corpus.rows(), layout.state_dim(), |i| STATE_FLOOR * layout.state_unit(i), state);
+        let state = Scaling::fit(
+            corpus.rows(),
+            layout.state_dim(),
+            |i| layout.state_unit(i).map_or(0.0, |unit| STATE_FLOOR * unit),
+            state,
+        );
         let derived = if width == 0 { Scaling::default() } else { Scaling::fit(corpus.rows(), width, |_| STATE_FLOOR, derived) };
         Self::from_scaling(layout, set, mask_dq, state, derived)
     }

@@ -42,7 +42,7 @@ impl Policy {
         let action = Scaling::fit(
             corpus.rows(),
             dim,
-            |i| ACTION_FLOOR_RAD_S * corpus.layout.action_unit(i),
+            |i| corpus.layout.action_unit(i).map_or(0.0, |unit| ACTION_FLOOR_RAD_S * unit),
             |r, row| row.copy_from_slice(corpus.commanded(r)),
         );
         let mut lengths: Vec<usize> = (0..corpus.demos()).map(|i| corpus.demo(i).len()).collect();

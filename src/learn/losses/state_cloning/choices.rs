@@ -61,18 +61,21 @@ impl Choices {
     /// From the settings and the training demos.
     pub fn new(settings: &TrainSettings, corpus: &Corpus) -> Self {
         let (layout, dim, changing) = (&corpus.layout, corpus.layout.state_dim(), corpus.layout.changing());
+        let of_states = || {
+            let floor = |i| layout.state_unit(i).map_or(0.0, |unit| STATE_FLOOR * unit);
+            Scaling::fit(corpus.rows(), dim, floor, |r, row| row.copy_from_slice(corpus.state(r))).std
+        };
         let std = match (settings.loss, settings.sc.scale) {
             (Objective::RawSum, _) => vec![1.0; changing],
-            (_, StateScale::State) => {
-                let floor = |i| STATE_FLOOR * layout.state_unit(i);
-                Scaling::fit(corpus.rows(), dim, floor, |r, row| row.copy_from_slice(corpus.state(r))).std
-            }
+            (_, StateScale::State) => of_states(),
             (_, StateScale::Step) => {
                 let change = |r: usize, row: &mut [f32]| {
                     let entries = row.iter_mut().zip(corpus.next(r).iter().zip(corpus.state(r)));
                     entries.for_each(|(change, (next, state))| *change = next - state);
                 };
-                Scaling::fit(corpus.rows(), changing, |i| STEP_FLOOR * layout.state_unit(i), change).std
+                let spread = of_states();
+                let floor = |i: usize| STEP_FLOOR * layout.state_unit(i).unwrap_or(spread[i]);
+                Scaling::fit(corpus.rows(), changing, floor, change).std
             }
         };
         let velocity = |i: usize| layout.velocities().contains(&i);

@@ -58,7 +58,7 @@ impl Statistics {
     pub fn features(&self, sight: &Sight) -> Features {
         let [state, derived] = sight.widths();
         let std = |i: usize| {
-            let floor = FLOOR * f64::from(sight.layout.state_unit(i));
+            let floor = FLOOR * f64::from(sight.layout.state_unit(i).unwrap_or(1.0));
             (self.squares[i] / self.count.max(1.0)).sqrt().max(floor) as f32
         };
         let scaling = |range: std::ops::Range<usize>| Scaling {
