@@ -2,7 +2,9 @@
 
 use super::console::Console;
 use super::context::{Context, Outcome};
-use super::{convert, evaluate, experiment, inspect, plan, pretrain, render, report, robot, settings, simulate, train};
+use super::{
+    convert, evaluate, experiment, inspect, plan, pretrain, render, report, robot, serve, serve_env, settings, simulate, train,
+};
 use crate::error::{Error, Result};
 use crate::interrupt::Interrupt;
 use clap::{Parser, Subcommand};
@@ -53,6 +55,8 @@ enum Command {
     Experiment(experiment::Args),
     Report(report::Args),
     Robot(robot::Args),
+    Serve(serve::Args),
+    ServeEnv(serve_env::Args),
 }
 
 impl Cli {
@@ -78,6 +82,8 @@ impl Cli {
             Command::Evaluate(args) => evaluate::run(args, &context),
             Command::Experiment(args) => experiment::run(args, &context),
             Command::Report(args) => report::run(args, &context),
+            Command::Serve(args) => serve::run(args, &context),
+            Command::ServeEnv(args) => serve_env::run(args, &context),
             Command::Inspect(args) => return inspect::run(args, &context),
             Command::Render(args) => render::run(args, &context),
             Command::Robot(args) => return robot::run(args, &context),
