@@ -49,7 +49,11 @@ fn twelve_thousand_broken_messages_are_each_answered_and_leave_nothing() {
     let (mut refused, mut answered) = (0, 0);
     let mut talk = server.talk();
     for number in 0..MESSAGES {
-        let bytes = if number % 10 == 0 { (0..rng.random_range(0..200)).map(|_| rng.random()).collect() } else { mutated(&whole, &mut rng) };
+        let bytes = if number % 10 == 0 {
+            (0..rng.random_range(0..200)).map(|_| rng.random()).collect()
+        } else {
+            mutated(&whole, &mut rng)
+        };
         assert!(talk.say(bytes.clone()), "message {number} ended the conversation");
         match talk.hear() {
             Some(Message::Text(_)) => refused += 1,
@@ -78,7 +82,8 @@ fn noise_in_place_of_a_conversation_ends_that_connection_alone() {
         // It may have been hung up.
         let _ = stream.write_all(&bytes);
     }
-    let mut talk = (0..100).find_map(|_| Talk::with(server.address, None).ok().or_else(|| pause(50))).expect("there is room again");
+    let mut talk =
+        (0..100).find_map(|_| Talk::with(server.address, None).ok().or_else(|| pause(50))).expect("there is room again");
     assert_eq!(talk.ask().len(), 9);
     server.end();
 }
