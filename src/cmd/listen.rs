@@ -1,15 +1,17 @@
 //! The flags of commands that others talk to.
 
 use super::{Context, Outcome, output};
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::interrupt::Interrupt;
 use crate::serve::{Host, LineLink, Server, Token, check_address, read_token};
 use std::io::{BufReader, Read, stdin, stdout};
 use std::net::IpAddr;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread;
 
-/// Ends the process as a signal that asks it to.
+/// The signal that asks a process to end.
 const SIGTERM: i32 = 15;
 
 /// Where and to whom.
@@ -44,7 +46,7 @@ impl ListenArgs {
     /// Serves until it is interrupted, or its input ends.
     ///
     /// # Errors
-    /// [`crate::error::Error::Usage`] for an address that would be open to all; what [`Server`] returns.
+    /// [`Error::Usage`] for an address that would be open to all; what [`Server`] returns.
     pub fn serve(&self, host: &dyn Host, context: &Context) -> Result<Outcome> {
         if self.stdio {
             let mut link = LineLink::new(BufReader::new(stdin()), stdout(), &context.interrupt)?;
@@ -53,22 +55,28 @@ impl ListenArgs {
         let token = self.token_file.as_deref().map(read_token).transpose()?.map(|text| Token::new(&text));
         check_address(self.host, token.as_ref())?;
         let server = Server::bind(self.host, self.port, token, self.connections.into())?;
+        let ended = Arc::<AtomicBool>::default();
         if self.end_with_stdin {
-            end_with_stdin(&context.interrupt)?;
+            end_with_stdin(&context.interrupt, &ended)?;
         }
         output::print(&format!("ws://{}\n", server.address()?))?;
-        server.run(host, &context.interrupt, &|line| context.console.say(line)).map(|()| Outcome::Done)
+        match server.run(host, &context.interrupt, &|line| context.console.say(line)) {
+            Err(Error::Interrupted) if ended.load(Ordering::SeqCst) => Ok(Outcome::Done),
+            other => other.map(|()| Outcome::Done),
+        }
     }
 }
 
-fn end_with_stdin(interrupt: &Interrupt) -> Result<()> {
-    let interrupt = interrupt.clone();
+/// Stops the server when there is nothing more to read, and says so in `ended`.
+fn end_with_stdin(interrupt: &Interrupt, ended: &Arc<AtomicBool>) -> Result<()> {
+    let (interrupt, ended) = (interrupt.clone(), Arc::clone(ended));
     let wait = move || {
         let mut part = [0; 1024];
         // Whatever comes is passed over; an error is an end as well.
         while stdin().read(&mut part).is_ok_and(|count| count > 0) {}
+        ended.store(true, Ordering::SeqCst);
         interrupt.raise(SIGTERM);
     };
     let started = thread::Builder::new().name("stdin".into()).spawn(wait);
-    started.map(drop).map_err(|e| crate::error::Error::Failed(format!("cannot start a thread that waits: {e}")))
+    started.map(drop).map_err(|e| Error::Failed(format!("cannot start a thread that waits: {e}")))
 }

@@ -126,7 +126,7 @@ mod tests {
         link.refuse("no");
         assert_eq!(came.len(), 5);
         assert_eq!((&came[0], &came[4]), (&Ok("{\"a\":1}".into()), &Ok("{\"b\":[1.5]}".into())));
-        assert!(came[1..4].iter().all(Result::is_err), "{came:?}");
+        assert!(came[1..4].iter().all(|line| line.is_err()), "{came:?}");
         assert_eq!(String::from_utf8(out).expect("text"), "{\"error\":\"no\"}\n");
     }
 }

@@ -9,6 +9,8 @@ from .wire import Conversation
 
 STATE = "observation.state"
 ENVIRONMENT = "observation.environment_state"
+# No number of a state is larger: such a simulation has broken down.
+MOST = 1e6
 
 
 class HiltEnv(gymnasium.Env):
@@ -54,7 +56,7 @@ class HiltEnv(gymnasium.Env):
         self.about = about
         self._first, self._horizon, self._episodes, self._flat = int(seed), horizon_steps, episodes, flat
         widths = {key: len(names) for key, names in about["keys"].items() if names}
-        box = lambda width: spaces.Box(-np.inf, np.inf, (width,), np.float32)
+        box = lambda width: spaces.Box(-MOST, MOST, (width,), np.float32)
         self.observation_space = (
             box(sum(widths.values())) if flat else spaces.Dict({key: box(width) for key, width in widths.items()})
         )

@@ -1,5 +1,8 @@
 """msgpack with NumPy's arrays, as openpi packs them, and a conversation in it. Nothing is ever unpickled."""
 
+import inspect
+from contextlib import ExitStack
+
 import msgpack
 import numpy as np
 from websockets.exceptions import ConnectionClosed
@@ -7,6 +10,8 @@ from websockets.sync.client import connect
 
 # hilt sends no larger message.
 MOST_BYTES = 4 << 20
+# No proxy stands between this machine and itself; older versions know none.
+DIRECT = {"proxy": None} if "proxy" in inspect.signature(connect.__init__ if inspect.isclass(connect) else connect).parameters else {}
 # Kinds of numbers: bool, signed, unsigned, floating.
 KINDS = "biuf"
 
@@ -57,12 +62,15 @@ class Conversation:
 
     def __init__(self, address, token=None, timeout=60.0):
         headers = {"Authorization": f"Bearer {token}"} if token else None
-        # No proxy stands between this machine and itself; small messages leave at once.
-        self._socket = connect(
-            address, compression=None, max_size=MOST_BYTES, additional_headers=headers, open_timeout=timeout, proxy=None
+        self._timeout, self._open = timeout, ExitStack()
+        self._socket = self._open.enter_context(
+            connect(address, compression=None, max_size=MOST_BYTES, additional_headers=headers, open_timeout=timeout, **DIRECT)
         )
-        self._timeout = timeout
-        self.metadata = self._receive()
+        try:
+            self.metadata = self._receive()
+        except BaseException:
+            self.close()
+            raise
 
     def _receive(self):
         answer = self._socket.recv(timeout=self._timeout)
@@ -80,4 +88,4 @@ class Conversation:
 
     def close(self):
         """Ends the conversation."""
-        self._socket.close()
+        self._open.close()
