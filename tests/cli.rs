@@ -3,7 +3,8 @@
 use assert_cmd::Command;
 use std::fs;
 
-const STAGES: [&str; 9] = ["plan", "simulate", "convert", "pretrain", "train", "evaluate", "inspect", "render", "settings"];
+const STAGES: [&str; 11] =
+    ["plan", "simulate", "convert", "pretrain", "train", "evaluate", "inspect", "render", "settings", "serve", "serve-env"];
 
 fn hilt(words: &[&str]) -> Command {
     let mut command = Command::cargo_bin("hilt").expect("the binary is built with the tests");

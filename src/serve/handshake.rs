@@ -3,6 +3,7 @@
 use super::access::{Token, origin_is_ours};
 use super::paced::{Paced, is_tick};
 use std::io::{Read, Write};
+use std::net::TcpStream;
 use std::time::{Duration, Instant};
 use tungstenite::handshake::derive_accept_key;
 
@@ -12,6 +13,8 @@ const MOST_BYTES: usize = 8 << 10;
 const MOST_HEADERS: usize = 64;
 /// Until a request is whole.
 const MOST_TIME: Duration = Duration::from_secs(5);
+/// How long a caller that is turned away may take to ask and to hear it: all others wait so long.
+const TURN_AWAY_TIME: Duration = Duration::from_millis(5);
 /// The end of a request's head.
 const END: &[u8] = b"\r\n\r\n";
 
@@ -39,8 +42,11 @@ pub fn shake(stream: &mut Paced, token: Option<&Token>) -> Option<Vec<u8>> {
     }
 }
 
-/// Turns a connection away.
-pub fn turn_away(stream: &mut impl Write, why: &str) {
+/// Turns a connection away. What it asks is taken first, where it is there: the system drops what was said to who is hung up on unheard.
+pub fn turn_away(stream: &mut TcpStream, why: &str) {
+    let waits = stream.set_nonblocking(false).and_then(|()| stream.set_read_timeout(Some(TURN_AWAY_TIME)));
+    // A caller that does not listen is not waited for.
+    let _ = waits.and_then(|()| stream.set_write_timeout(Some(TURN_AWAY_TIME))).and_then(|()| stream.read(&mut [0; MOST_BYTES]));
     answer(stream, "503 Service Unavailable", "", &format!("{why}\n"));
 }
 
@@ -161,6 +167,6 @@ mod tests {
         assert_eq!(status("POST / HTTP/1.1\r\n\r\n"), Err("405 Method Not Allowed"));
         assert_eq!(status("\x00\x01\r\n\r\n"), Err("400 Bad Request"));
         assert_eq!(judged(&"A: b\r\n".repeat(80), None), Err("400 Bad Request"));
-        assert_eq!(status(&SOCKET.replace("13", "8").replace("-8\r", "\r")), Err("426 Upgrade Required"));
+        assert_eq!(status(&format!("{SOCKET}\r\n").replace("Version: 13", "Version: 8")), Err("426 Upgrade Required"));
     }
 }

@@ -80,8 +80,11 @@ fn pass_over(input: &mut impl BufRead, mut ended: bool) -> Option<()> {
 impl<W: Write> Link for LineLink<W> {
     fn receive(&mut self, patience: Option<Duration>) -> Result<Received> {
         let began = Instant::now();
-        while !self.gone {
+        loop {
             self.interrupt.check()?;
+            if self.gone {
+                return Ok(Received::Gone);
+            }
             let left = patience.map_or(TICK, |patience| patience.saturating_sub(began.elapsed()).min(TICK));
             match self.lines.recv_timeout(left) {
                 Ok(message) => return Ok(Received::Message(message)),
@@ -89,10 +92,9 @@ impl<W: Write> Link for LineLink<W> {
                     return Ok(Received::Silence);
                 }
                 Err(RecvTimeoutError::Timeout) => {}
-                Err(RecvTimeoutError::Disconnected) => break,
+                Err(RecvTimeoutError::Disconnected) => self.gone = true,
             }
         }
-        Ok(Received::Gone)
     }
 
     fn send(&mut self, value: &Value) {

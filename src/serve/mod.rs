@@ -8,6 +8,7 @@
 
 mod access;
 mod array;
+mod asked;
 mod bounds;
 mod client;
 mod dial;
@@ -21,6 +22,7 @@ mod rows;
 mod server;
 mod session;
 mod socket;
+mod told;
 mod value;
 mod world;
 

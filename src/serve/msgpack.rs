@@ -194,7 +194,7 @@ mod tests {
 
     /// `msgpack_numpy.packb({"a": np.array([1.5, -2], np.float32), "n": np.float32(0.5), "t": ["x", None, -7, 300]})` of openpi-client.
     const OPENPI: &[u8] = b"\x83\xa1a\x84\xc4\x0b__ndarray__\xc3\xc4\x04data\xc4\x08\x00\x00\xc0?\x00\x00\x00\xc0\xc4\x05dtype\xa3<f4\xc4\x05shape\x91\x02\
-        \xa1n\x83\xc4\x0e__npgeneric__\xc3\xc4\x04data\xcb?\xe0\x00\x00\x00\x00\x00\x00\xc4\x05dtype\xa3<f4\xa1t\x94\xa1x\xc0\xf9\xcd\x01,";
+        \xa1n\x83\xc4\x0d__npgeneric__\xc3\xc4\x04data\xcb?\xe0\x00\x00\x00\x00\x00\x00\xc4\x05dtype\xa3<f4\xa1t\x94\xa1x\xc0\xf9\xcd\x01,";
 
     #[test]
     fn what_openpi_packs_is_read_and_packed_alike() {
@@ -244,6 +244,6 @@ mod tests {
         assert!(refused(b"").contains("cut short"));
         // A pickled object, as numpy would have it.
         let object = b"\x84\xc4\x0b__ndarray__\xc3\xc4\x04data\xc4\x01.\xc4\x05dtype\xa2|O\xc4\x05shape\x91\x01";
-        assert!(refused(object).contains("type \"|O\""), "{}", refused(object));
+        assert!(refused(object).contains("type |O: allowed"), "{}", refused(object));
     }
 }

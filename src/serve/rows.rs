@@ -73,7 +73,8 @@ impl Rows {
             row
         };
         let names = || self.layout.state.iter().flat_map(|span| &span.entries);
-        match row.iter().zip(names()).find(|(v, _)| !(f64::from(v.abs()) <= LARGEST_NUMBER)) {
+        let possible = |v: f32| v.is_finite() && f64::from(v.abs()) <= LARGEST_NUMBER;
+        match row.iter().zip(names()).find(|(v, _)| !possible(**v)) {
             Some((value, name)) => Err(format!("{name} is {value}; it must be a number within {LARGEST_NUMBER:e} either way")),
             None => Ok(row),
         }

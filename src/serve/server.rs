@@ -13,10 +13,6 @@ use std::io::ErrorKind;
 use std::net::{IpAddr, SocketAddr, TcpListener, TcpStream};
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::thread;
-use std::time::Duration;
-
-/// How long a caller that is turned away may take to hear it.
-const TURN_AWAY_TIME: Duration = Duration::from_millis(100);
 
 /// Where is listened, and to whom.
 #[derive(Debug)]
@@ -76,8 +72,6 @@ impl Server {
                 let (mut stream, peer) = self.next(interrupt)?;
                 if open.fetch_add(1, Ordering::SeqCst) >= self.most {
                     open.fetch_sub(1, Ordering::SeqCst);
-                    // A caller that does not read is not waited for.
-                    let _ = stream.set_nonblocking(false).and_then(|()| stream.set_write_timeout(Some(TURN_AWAY_TIME)));
                     turn_away(&mut stream, "all connections are taken; try again later");
                     continue;
                 }

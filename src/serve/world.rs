@@ -1,42 +1,29 @@
 //! The simulated task as somebody else's environment: the episodes of an evaluation, step by step, over a wire.
 
-use super::link::{Link, Message, Received};
-use super::rows::{MOST_HORIZON_STEPS, Rows};
+use super::asked::{Asked, Questions, SPLITS, Wanted};
+use super::link::{Link, Received};
+use super::rows::Rows;
 use super::server::Host;
+use super::told::Teller;
 use super::value::Value;
 use crate::config::Pipeline;
-use crate::demo::Episode;
 use crate::error::Result;
-use crate::eval::{Rollouts, Trial};
+use crate::eval::Rollouts;
 use crate::interrupt::Interrupt;
 use crate::joints::Joints;
-use crate::sim::{Controller, fallen};
+use crate::sim::Controller;
 use crate::state::Action;
 use crate::tasks::{FailureClass, Observation, Verdict};
 use serde_json::{Value as Json, json};
-
-/// What episodes are for.
-const SPLITS: [&str; 2] = ["evaluation", "training"];
 
 /// Serves a task's simulated world: each conversation has a world of its own.
 #[derive(Debug)]
 pub struct WorldHost<'a> {
     pipeline: &'a Pipeline,
-    seed: u64,
-    horizon_steps: u32,
-    rows: Rows,
-    conditions: Vec<String>,
+    questions: Questions,
+    teller: Teller,
     metadata: Json,
     interrupt: Interrupt,
-}
-
-/// Which episode is asked for.
-#[derive(Clone, Copy, Debug, PartialEq)]
-struct Wanted {
-    seed: u64,
-    episode: u64,
-    horizon_steps: u32,
-    training: bool,
 }
 
 impl<'a> WorldHost<'a> {
@@ -62,59 +49,9 @@ impl<'a> WorldHost<'a> {
             "failures": FailureClass::ALL.map(FailureClass::name),
             "layout": *layout,
         });
-        WorldHost { pipeline, seed, horizon_steps, rows, conditions, metadata, interrupt: interrupt.clone() }
-    }
-
-    /// The first message.
-    pub fn metadata(&self) -> &Json {
-        &self.metadata
-    }
-
-    /// What comes after `last`, unless the message says otherwise.
-    fn wanted(&self, reset: &Value, last: Option<Wanted>) -> std::result::Result<Wanted, String> {
-        if !matches!(reset, Value::Map(_)) {
-            return Err(format!("\"reset\" is {}; it must be a map, empty for the next episode", reset.kind()));
-        }
-        let number = |key: &str| match reset.get(key) {
-            None | Some(Value::Nil) => Ok(None),
-            Some(value) => {
-                value.as_u64().map(Some).ok_or_else(|| format!("\"{key}\" of \"reset\" must be a whole number from 0"))
-            }
-        };
-        let first = Wanted { seed: self.seed, episode: 0, horizon_steps: self.horizon_steps, training: false };
-        let next = last.map_or(first, |last| Wanted { episode: last.episode.saturating_add(1), ..last });
-        let training = match reset.get("episodes").map(Value::as_text) {
-            None => next.training,
-            Some(Some(split)) if SPLITS.contains(&split) => split == SPLITS[1],
-            Some(_) => return Err(format!("\"episodes\" of \"reset\" must be one of {SPLITS:?}")),
-        };
-        let seed = number("seed")?;
-        let begins = seed.is_some() || training != next.training;
-        let horizon_steps = number("horizon_steps")?.unwrap_or(u64::from(next.horizon_steps));
-        if !(1..=u64::from(MOST_HORIZON_STEPS)).contains(&horizon_steps) {
-            return Err(format!("\"horizon_steps\" of \"reset\" is {horizon_steps}; allowed: 1 to {MOST_HORIZON_STEPS}"));
-        }
-        Ok(Wanted {
-            seed: seed.unwrap_or(next.seed),
-            episode: number("episode")?.unwrap_or(if begins { 0 } else { next.episode }),
-            horizon_steps: horizon_steps as u32,
-            training,
-        })
-    }
-
-    fn ask(&self, message: &Message, last: Option<Wanted>) -> std::result::Result<Asked, String> {
-        let value = message.value()?;
-        if let Some(reset) = value.get("reset") {
-            return self.wanted(reset, last).map(Asked::Reset);
-        }
-        let Some(step) = value.get("step") else { return Err("a message has the key \"reset\" or \"step\"".into()) };
-        let Some(action) = step.get("action") else { return Err("\"step\" must be a map with an \"action\"".into()) };
-        let numbers = action.numbers().map_err(|why| format!("\"action\" holds {why}"))?;
-        let (width, shape) = (self.rows.layout().action_dim(), numbers.shape.clone());
-        match numbers.rows(width).as_deref() {
-            Some([row]) => Ok(Asked::Step(row.clone())),
-            _ => Err(format!("\"action\" has shape {shape:?}; it must be one row of {width} numbers")),
-        }
+        let first = Wanted { seed, episode: 0, horizon_steps, training: false };
+        let (questions, teller) = (Questions::new(&rows, first), Teller::new(&rows, conditions));
+        WorldHost { pipeline, questions, teller, metadata, interrupt: interrupt.clone() }
     }
 
     /// Plays an episode; what ends the conversation or begins another episode.
@@ -137,44 +74,25 @@ impl<'a> WorldHost<'a> {
         if steps == 0 {
             link.refuse(&format!("episode {}: the simulation breaks down before the first step", wanted.episode));
         } else {
-            link.send(&self.end(&episode, wanted));
+            link.send(&self.teller.end(&episode, wanted));
         }
         Ok(Next::Idle)
     }
 
-    fn moment(&self, row: &[f32], reward: f64, conditions: &[bool], success: bool) -> (Value<'static>, Value<'_>) {
-        let named = self.conditions.iter().zip(conditions);
-        let conditions = named.map(|(name, holds)| (name.as_str().into(), Value::Bool(*holds))).collect();
-        let info = Value::map([("success", Value::Bool(success)), ("conditions", Value::Map(conditions))]);
-        let mut answer = Value::map([("observation", self.rows.observation(row))]);
-        answer.insert("reward", Value::Float(reward));
-        (answer, info)
+    /// Waits for a reset.
+    fn idle(&self, link: &mut dyn Link, last: Option<Wanted>) -> Result<Next> {
+        let message = match link.receive(None)? {
+            Received::Gone => return Ok(Next::Gone),
+            Received::Silence => return Ok(Next::Idle),
+            Received::Message(message) => message,
+        };
+        match self.questions.read(&message, last) {
+            Ok(Asked::Reset(wanted)) => return Ok(Next::Reset(wanted)),
+            Ok(Asked::Step(_)) => link.refuse("no episode runs: send \"reset\" first"),
+            Err(why) => link.refuse(&why),
+        }
+        Ok(Next::Idle)
     }
-
-    /// The last answer of an episode.
-    fn end(&self, episode: &Episode, wanted: Wanted) -> Value<'_> {
-        let (last, trial) = (&episode.last, Trial::of(episode));
-        let broken = matches!(episode.failure, Some(FailureClass::CommandNotFinite | FailureClass::SimulationBrokeDown));
-        // Such a moment has been paid before.
-        let reward = if broken { 0.0 } else { last.reward };
-        let terminated = episode.success || broken || fallen(&last.objects);
-        let (mut answer, mut info) = self.moment(&last.state.to_row(), reward, &last.conditions, episode.success);
-        answer.insert("terminated", Value::Bool(terminated));
-        answer.insert("truncated", Value::Bool(!terminated));
-        info.insert("failure", episode.failure.map_or(Value::Nil, |class| Value::text(class.name())));
-        info.insert("episode", Value::Int(wanted.episode as i64));
-        info.insert("steps", Value::Int(trial.steps as i64));
-        info.insert("return", Value::Float(trial.reward));
-        info.insert("hit_obstacle", Value::Bool(trial.hit_obstacle));
-        answer.insert("info", info);
-        answer
-    }
-}
-
-/// What a client asks.
-enum Asked {
-    Reset(Wanted),
-    Step(Vec<f32>),
 }
 
 /// What comes after an episode.
@@ -194,25 +112,11 @@ impl Host for WorldHost<'_> {
         loop {
             next = match next {
                 Next::Gone => return Ok(()),
+                Next::Idle => self.idle(link, last)?,
                 Next::Reset(wanted) => {
                     last = Some(wanted);
                     self.play(link, wanted)?
                 }
-                Next::Idle => match link.receive(None)? {
-                    Received::Gone => Next::Gone,
-                    Received::Silence => Next::Idle,
-                    Received::Message(message) => match self.ask(&message, last) {
-                        Ok(Asked::Reset(wanted)) => Next::Reset(wanted),
-                        Ok(Asked::Step(_)) => {
-                            link.refuse("no episode runs: send \"reset\" first");
-                            Next::Idle
-                        }
-                        Err(why) => {
-                            link.refuse(&why);
-                            Next::Idle
-                        }
-                    },
-                },
             };
         }
     }
@@ -230,17 +134,8 @@ struct Wire<'a, 'l> {
 
 impl Wire<'_, '_> {
     fn tell(&mut self, seen: &Observation) {
-        let Some(verdict) = &self.verdict else { return };
-        let (mut answer, mut info) = self.host.moment(&seen.state.to_row(), verdict.reward, &verdict.conditions, false);
-        if self.steps == 0 {
-            info.insert("episode", Value::Int(self.wanted.episode as i64));
-            info.insert("seed", Value::Int(self.wanted.seed as i64));
-            info.insert("horizon_steps", Value::Int(i64::from(self.wanted.horizon_steps)));
-        } else {
-            answer.insert("terminated", Value::Bool(false));
-            answer.insert("truncated", Value::Bool(false));
-        }
-        answer.insert("info", info);
+        let (teller, verdict) = (&self.host.teller, self.verdict.as_ref().expect("a moment is judged before it is acted in"));
+        let answer = if self.steps == 0 { teller.first(seen, verdict, self.wanted) } else { teller.step(seen, verdict) };
         self.link.send(&answer);
     }
 
@@ -248,7 +143,7 @@ impl Wire<'_, '_> {
     fn action(&mut self) -> Option<Vec<f32>> {
         loop {
             let next = match self.link.receive(None) {
-                Ok(Received::Message(message)) => match self.host.ask(&message, Some(self.wanted)) {
+                Ok(Received::Message(message)) => match self.host.questions.read(&message, Some(self.wanted)) {
                     Ok(Asked::Step(action)) => return Some(action),
                     Ok(Asked::Reset(wanted)) => Next::Reset(wanted),
                     Err(why) => {

@@ -23,5 +23,5 @@ if ! cmp -s "$here/requirements.txt" "$home/installed.txt"; then
     "$home/venv/bin/pip" install --quiet --disable-pip-version-check --requirement "$here/requirements.txt"
     cp "$here/requirements.txt" "$home/installed.txt"
 fi
-"$home/venv/bin/python" "$here/gym.py" "$here/../../target/release/hilt" "$1"
+"$home/venv/bin/python" "$here/wire.py" "$here/../../target/release/hilt" "$1"
 HF_HUB_OFFLINE=1 HF_HOME="$home/huggingface" exec "$home/venv/bin/python" "$here/run.py" "$1"

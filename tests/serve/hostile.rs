@@ -2,6 +2,7 @@
 
 use crate::servers::{PATIENCE, Served, Talk, observation};
 use hilt::seed::stream;
+use hilt::serve::{Array, Value, encode};
 use rand::{Rng, RngExt};
 use std::fs;
 use std::io::{Read, Write};
@@ -65,6 +66,22 @@ fn twelve_thousand_broken_messages_are_each_answered_and_leave_nothing() {
     assert_eq!(talk.ask(), right);
     let growth = memory().saturating_sub(before);
     assert!(growth < MOST_GROWTH, "{growth} bytes more");
+    server.end();
+}
+
+#[test]
+fn broken_messages_to_a_world_are_each_answered_and_episodes_go_on() {
+    let (server, mut rng) = (Served::world(), stream(2, "hostile", 0));
+    let mut talk = server.talk();
+    let action = Value::Array(Array::f32(&[9], &[0.1; 9]));
+    let step = encode(&Value::map([("step", Value::map([("action", action)]))]));
+    let reset = encode(&Value::map([("reset", Value::map([("episode", Value::Int(3))]))]));
+    for number in 0..3_000 {
+        let bytes = mutated(if number % 8 == 0 { &reset } else { &step }, &mut rng);
+        assert!(talk.say(bytes.clone()), "message {number} ended the conversation");
+        assert!(talk.hear().is_some(), "message {number}, {bytes:?}");
+    }
+    assert!(talk.say(reset) && matches!(talk.hear(), Some(Message::Binary(_))));
     server.end();
 }
 

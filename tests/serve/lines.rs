@@ -1,8 +1,11 @@
 //! A robot that speaks JSON: rates, velocities, limits, and what happens when it falls silent.
 
 use crate::servers::{HILT, host, policy, policy_file, row};
+use hilt::data::weights;
 use hilt::interrupt::Interrupt;
-use hilt::serve::{Host, LineLink, PolicyOptions};
+use hilt::learn::Policy;
+use hilt::robot::file::built_in::paper_robot;
+use hilt::serve::{Host, LineLink, PolicyHost, PolicyOptions};
 use serde_json::{Value, json};
 use std::io::{BufRead, BufReader, Cursor, Write};
 use std::process::{Command, Stdio};
@@ -10,10 +13,14 @@ use std::time::{Duration, Instant};
 
 /// The answers of a policy to these lines, behind its metadata.
 fn talk(options: PolicyOptions, lines: &[Value]) -> Vec<Value> {
+    talk_to(&host(options), lines)
+}
+
+fn talk_to(host: &PolicyHost, lines: &[Value]) -> Vec<Value> {
     let mut out = Vec::new();
     let input: String = lines.iter().map(|line| format!("{line}\n")).collect();
     let mut link = LineLink::new(Cursor::new(input), &mut out, &Interrupt::default()).expect("a thread");
-    host(options).converse(&mut link, 0).expect("no interrupt");
+    host.converse(&mut link, 0).expect("no interrupt");
     let text = String::from_utf8(out).expect("text");
     text.lines().skip(1).map(|line| serde_json::from_str(line).expect("JSON")).collect()
 }
@@ -80,14 +87,14 @@ fn velocities_are_made_of_positions_where_the_robots_own_are_not_believed() {
     }
     // Then none need be sent.
     let bare = json!({ "observation.state": row()[..9], "observation.environment_state": row()[18..] });
-    let answers = talk(PolicyOptions { estimate_dq: true, ..Default::default() }, &[bare.clone()]);
+    let answers = talk(PolicyOptions { estimate_dq: true, ..Default::default() }, std::slice::from_ref(&bare));
     assert_eq!(actions(&answers[0]), policy().act(&row()));
     assert!(talk(PolicyOptions::default(), &[bare])[0]["error"].is_string());
 }
 
 #[test]
 fn commands_stay_within_the_robots_limits_and_say_so() {
-    let robot = hilt::robot::file::built_in::paper_robot();
+    let robot = paper_robot();
     let limited = (0..robot.joints.len()).find(|i| !robot.joints[*i].continuous).expect("a joint that something stops");
     let mut stuck = row();
     stuck[limited] = robot.joints[limited].limits[1] as f32 + 0.1;
@@ -106,6 +113,19 @@ fn commands_stay_within_the_robots_limits_and_say_so() {
 }
 
 #[test]
+fn an_action_that_is_no_number_becomes_a_stop() {
+    let (mut tensors, meta, _) = weights::read(&policy_file(), "policy").expect("weights");
+    for tensor in tensors.iter_mut().filter(|t| ["policy.action.std", "policy.layer_4.bias"].contains(&t.name.as_str())) {
+        tensor.data.fill(1e38);
+    }
+    let policy = Policy::from_tensors(&tensors, &meta).expect("a policy");
+    assert!(policy.act(&row()).iter().any(|v| !v.is_finite()));
+    let host = PolicyHost::new(policy, &paper_robot(), PolicyOptions::default(), Default::default()).expect("the robot's");
+    let answers = talk_to(&host, &[whole(&row())]);
+    assert_eq!((actions(&answers[0]), &answers[0]["command_not_finite"]), (vec![0.0; 9], &json!(true)));
+}
+
+#[test]
 fn samples_depend_on_seed_and_episode_alone() {
     let ask = |seed, episode| {
         let first = json!({ "state": row(), "episode_index": episode, "frame_index": 0 });
@@ -115,6 +135,23 @@ fn samples_depend_on_seed_and_episode_alone() {
     assert_eq!(ask(1, 5), ask(1, 5));
     assert!(ask(1, 5) != ask(1, 6) && ask(1, 5) != ask(2, 5));
     assert_ne!(ask(1, 5)[0], ask(1, 5)[1]);
+}
+
+#[test]
+fn the_command_in_the_documentation_is_answered() {
+    let docs = std::fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/docs/serve.md")).expect("readable");
+    let command =
+        docs.split("```sh\n").skip(1).filter_map(|rest| rest.split("```").next()).find(|block| block.contains("--stdio"));
+    let command = command.expect("a command").replace("policy.safetensors", policy_file().to_str().expect("UTF-8 path"));
+    let output =
+        Command::new("bash").args(["-c", &command.replace("hilt serve", &format!("{HILT} serve"))]).output().expect("bash");
+    let lines: Vec<Value> = output.stdout.split(|b| *b == b'\n').filter_map(|line| serde_json::from_slice(line).ok()).collect();
+    assert_eq!((lines.len(), lines[0]["kind"].as_str()), (2, Some("policy")), "{}", String::from_utf8_lossy(&output.stderr));
+    assert_eq!(actions(&lines[1]).len(), 9);
+    // Every key that is sent has its words there.
+    for key in lines[1].as_object().expect("an answer").keys().chain(["limited", "held", "watchdog"].map(String::from).iter()) {
+        assert!(docs.contains(&format!("`{key}`")), "docs/serve.md does not say what {key} is");
+    }
 }
 
 #[test]

@@ -1,11 +1,13 @@
 //! Servers to talk to, in this process and as processes, and a client.
 
+use hilt::config::Pipeline;
 use hilt::data::weights;
 use hilt::error::Error;
 use hilt::interrupt::Interrupt;
 use hilt::learn::Policy;
 use hilt::robot::file::built_in::paper_robot;
-use hilt::serve::{Array, PolicyHost, PolicyOptions, Server, Token, Value, encode};
+use hilt::serve::{Array, PolicyHost, PolicyOptions, Server, Token, Value, WorldHost, encode};
+use hilt::task::built_in::pick_up;
 use std::io::{BufRead, BufReader};
 use std::net::{SocketAddr, TcpStream};
 use std::path::{Path, PathBuf};
@@ -45,10 +47,26 @@ pub struct Served {
 
 impl Served {
     pub fn new(most: usize, token: Option<&str>) -> Self {
+        Self::run(most, token, |server, stop| server.run(&host(PolicyOptions::default()), stop, &|_| ()))
+    }
+
+    /// The world of pick-up.
+    pub fn world() -> Self {
+        Self::run(4, None, |server, stop| {
+            let pipeline = Pipeline::defaults(&pick_up());
+            server.run(&WorldHost::new(&pipeline, 0, 50, stop), stop, &|_| ())
+        })
+    }
+
+    fn run(
+        most: usize,
+        token: Option<&str>,
+        work: impl FnOnce(Server, &Interrupt) -> hilt::error::Result<()> + Send + 'static,
+    ) -> Self {
         let server = Server::bind("127.0.0.1".parse().expect("an address"), 0, token.map(Token::new), most).expect("a port");
         let (address, interrupt) = (server.address().expect("known"), Interrupt::default());
         let stop = interrupt.clone();
-        let thread = thread::spawn(move || server.run(&host(PolicyOptions::default()), &stop, &|_| ()));
+        let thread = thread::spawn(move || work(server, &stop));
         Served { address, interrupt, thread: Some(thread) }
     }
 

@@ -1,6 +1,6 @@
 """hilt's wire from Python: the Gymnasium environment, served policies, and openpi's packing to the letter.
 
-Usage: gym.py HILT RUNS, where RUNS/pick-up holds what `make all TASK=pick-up` leaves. It installs python/hilt_gym of this checkout with pip into
+Usage: wire.py HILT RUNS, where RUNS/pick-up holds what `make all TASK=pick-up` leaves. It installs python/hilt_gym of this checkout with pip into
 the running Python. Exits 1 at the first thing that is not as promised.
 """
 
