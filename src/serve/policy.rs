@@ -4,7 +4,7 @@ use super::bounds::Bounds;
 use super::link::{Link, Received};
 use super::rows::Rows;
 use super::server::Host;
-use super::session::Session;
+use super::session::{Acting, PolicyOptions, Session};
 use super::value::Value;
 use crate::error::Result;
 use crate::layout::Layout;
@@ -14,26 +14,10 @@ use serde_json::{Value as Json, json};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-/// How a policy is served.
-#[derive(Clone, Debug, Default)]
-pub struct PolicyOptions {
-    /// How often the robot asks \[Hz\]; once a control period of the policy where it is not said.
-    pub robot_rate_hz: Option<f64>,
-    /// The robot stops when no observation has come for so long.
-    pub watchdog: Option<Duration>,
-    /// Whether joint velocities are made of the joint positions that follow each other, instead of believing the robot's.
-    pub estimate_dq: bool,
-    /// The seed by which actions are sampled; their mean where there is none.
-    pub sampling: Option<u64>,
-}
-
 /// Serves a policy of a robot.
 #[derive(Debug)]
 pub struct PolicyHost {
-    pub(super) policy: Arc<Policy>,
-    pub(super) rows: Rows,
-    pub(super) bounds: Bounds,
-    pub(super) options: PolicyOptions,
+    acting: Acting,
     metadata: Json,
 }
 
@@ -57,7 +41,7 @@ impl PolicyHost {
         }
         let step_s = options.robot_rate_hz.map_or(layout.period_s, |hz| 1.0 / hz);
         let (rows, bounds) = (Rows::new(&layout), Bounds::new(&layout, robot, step_s));
-        let mut host = PolicyHost { policy: Arc::new(policy), rows, bounds, options, metadata: Json::Null };
+        let mut host = PolicyHost { acting: Acting { policy, rows, bounds, options }, metadata: Json::Null };
         host.metadata = host.describe(&layout, robot, about);
         Ok(host)
     }
@@ -65,11 +49,6 @@ impl PolicyHost {
     /// The first message.
     pub fn metadata(&self) -> &Json {
         &self.metadata
-    }
-
-    /// Whether a policy must be told the joint velocities.
-    pub(super) fn needs_dq(&self) -> bool {
-        !(self.options.estimate_dq || self.policy.settings().mask_dq)
     }
 
     fn describe(&self, layout: &Layout, robot: &Robot, about: serde_json::Map<String, Json>) -> Json {
@@ -80,17 +59,17 @@ impl PolicyHost {
             "task": layout.name,
             "robot": robot.name,
             "period_s": layout.period_s,
-            "horizon_steps": self.policy.horizon_steps(),
+            "horizon_steps": self.acting.policy.horizon_steps(),
             "action_horizon": 1,
-            "keys": self.rows.keys(),
-            "actions": self.rows.actions(),
+            "keys": self.acting.rows.keys(),
+            "actions": self.acting.rows.actions(),
             "action_limits": layout.action_limits,
-            "position_limits": self.bounds.position(),
-            "needs_dq": self.needs_dq(),
-            "estimates_dq": self.options.estimate_dq,
-            "stochastic": self.options.sampling.is_some(),
-            "robot_rate_hz": self.options.robot_rate_hz,
-            "watchdog_ms": self.options.watchdog.map(|time| time.as_millis() as u64),
+            "position_limits": self.acting.bounds.position(),
+            "needs_dq": self.acting.needs_dq(),
+            "estimates_dq": self.acting.options.estimate_dq,
+            "stochastic": self.acting.options.sampling.is_some(),
+            "robot_rate_hz": self.acting.options.robot_rate_hz,
+            "watchdog_ms": self.acting.options.watchdog.map(|time| time.as_millis() as u64),
             "layout": layout,
         }) else {
             unreachable!("an object was written")
@@ -103,7 +82,7 @@ impl PolicyHost {
 impl Host for PolicyHost {
     fn converse(&self, link: &mut dyn Link, number: u64) -> Result<()> {
         link.send(&Value::of_json(&self.metadata));
-        let mut session = Session::new(self, number);
+        let mut session = Session::new(&self.acting, number);
         let mut before = None;
         loop {
             let message = match link.receive(session.patience())? {

@@ -1,10 +1,10 @@
 //! One robot's conversation with a policy: which action it gets when, and when it gets none.
 
 use super::array::Array;
-use super::bounds::Limited;
-use super::policy::PolicyHost;
-use super::rows::{EPISODE, FRAME};
+use super::bounds::{Bounds, Limited};
+use super::rows::{EPISODE, FRAME, Rows};
 use super::value::Value;
+use crate::learn::Policy;
 use crate::seed::stream;
 use rand_chacha::ChaCha8Rng;
 use std::f32::consts::{PI, TAU};
@@ -13,9 +13,42 @@ use std::time::{Duration, Instant};
 /// Rounding of a ratio of rates must not miss a period.
 const NEARLY: f64 = 1e-9;
 
+/// How a policy is served.
+#[derive(Clone, Debug, Default)]
+pub struct PolicyOptions {
+    /// How often the robot asks \[Hz\]; once a control period of the policy where it is not said.
+    pub robot_rate_hz: Option<f64>,
+    /// The robot stops when no observation has come for so long.
+    pub watchdog: Option<Duration>,
+    /// Whether joint velocities are made of the joint positions that follow each other, instead of believing the robot's.
+    pub estimate_dq: bool,
+    /// The seed by which actions are sampled; their mean where there is none.
+    pub sampling: Option<u64>,
+}
+
+/// Who answers all robots.
+#[derive(Debug)]
+pub struct Acting {
+    /// The policy.
+    pub policy: Policy,
+    /// Of its states.
+    pub rows: Rows,
+    /// Of its actions.
+    pub bounds: Bounds,
+    /// How it is served.
+    pub options: PolicyOptions,
+}
+
+impl Acting {
+    /// Whether it must be told the joint velocities.
+    pub fn needs_dq(&self) -> bool {
+        !(self.options.estimate_dq || self.policy.settings().mask_dq)
+    }
+}
+
 /// What is known of a robot since its episode began.
-pub(super) struct Session<'a> {
-    host: &'a PolicyHost,
+pub struct Session<'a> {
+    acting: &'a Acting,
     /// The conversation's number: it names the episode where the robot does not.
     number: u64,
     rng: Option<ChaCha8Rng>,
@@ -40,39 +73,39 @@ enum Watch {
 }
 
 impl<'a> Session<'a> {
-    pub(super) fn new(host: &'a PolicyHost, number: u64) -> Self {
-        let dq = vec![0.0; host.rows.layout().velocities().len()];
-        let mut session = Session { host, number, rng: None, asked: 0, held: Vec::new(), before: None, dq, watch: Watch::Off };
+    pub fn new(acting: &'a Acting, number: u64) -> Self {
+        let dq = vec![0.0; acting.rows.layout().velocities().len()];
+        let mut session = Session { acting, number, rng: None, asked: 0, held: Vec::new(), before: None, dq, watch: Watch::Off };
         session.begin(number);
         session
     }
 
     /// A new episode: nothing of what was before counts.
     fn begin(&mut self, episode: u64) {
-        self.rng = self.host.options.sampling.map(|seed| stream(seed, "evaluate.action", episode));
+        self.rng = self.acting.options.sampling.map(|seed| stream(seed, "evaluate.action", episode));
         (self.asked, self.before) = (0, None);
         self.dq.fill(0.0);
     }
 
     /// How long the next observation may take.
-    pub(super) fn patience(&self) -> Option<Duration> {
-        match (self.host.options.watchdog, &self.watch) {
+    pub fn patience(&self) -> Option<Duration> {
+        match (self.acting.options.watchdog, &self.watch) {
             (Some(most), Watch::Since(last)) => Some(most.saturating_sub(last.elapsed())),
             _ => None,
         }
     }
 
     /// No observation has come for too long: the command is to stand still, and what comes next begins anew.
-    pub(super) fn stop(&mut self) -> Value<'static> {
+    pub fn stop(&mut self) -> Value<'static> {
         self.watch = Watch::Late;
         self.begin(self.number);
-        let mut zero = Value::map([("actions", self.actions(&vec![0.0; self.host.rows.layout().action_dim()]))]);
+        let mut zero = Value::map([("actions", self.actions(&vec![0.0; self.acting.rows.layout().action_dim()]))]);
         zero.insert("watchdog", Value::Bool(true));
         zero
     }
 
     /// The robot has been told.
-    pub(super) fn stopped(&mut self) {
+    pub fn stopped(&mut self) {
         self.watch = Watch::Off;
     }
 
@@ -84,7 +117,7 @@ impl<'a> Session<'a> {
     ///
     /// # Errors
     /// Says what is wrong with it; the robot's clock goes on.
-    pub(super) fn answer(&mut self, message: &Value) -> Result<Value<'static>, String> {
+    pub fn answer(&mut self, message: &Value) -> Result<Value<'static>, String> {
         let episode = |value: Option<&Value>| value.and_then(Value::as_u64);
         if let Some(reset) = message.get("reset") {
             let episode = episode(reset.get("episode")).unwrap_or(self.number);
@@ -92,7 +125,7 @@ impl<'a> Session<'a> {
             self.watch = Watch::Off;
             return Ok(Value::map([("reset", Value::Bool(true))]));
         }
-        let mut row = self.host.rows.row(message, self.host.needs_dq())?;
+        let mut row = self.acting.rows.row(message, self.acting.needs_dq())?;
         if message.get(FRAME).and_then(Value::as_u64) == Some(0) {
             self.begin(episode(message.get(EPISODE)).unwrap_or(self.number));
         }
@@ -107,8 +140,8 @@ impl<'a> Session<'a> {
         if due {
             self.estimate(&mut row);
             self.held = match &mut self.rng {
-                Some(rng) => self.host.policy.sample(&row, rng),
-                None => self.host.policy.act(&row),
+                Some(rng) => self.acting.policy.sample(&row, rng),
+                None => self.acting.policy.act(&row),
             };
         }
         self.asked += 1;
@@ -117,21 +150,21 @@ impl<'a> Session<'a> {
 
     /// Whether a control period of the policy has begun since the last observation.
     fn is_due(&self) -> bool {
-        let Some(robot_hz) = self.host.options.robot_rate_hz else { return true };
-        let periods_each = 1.0 / (self.host.rows.layout().period_s * robot_hz);
+        let Some(robot_hz) = self.acting.options.robot_rate_hz else { return true };
+        let periods_each = 1.0 / (self.acting.rows.layout().period_s * robot_hz);
         let begun = |observations: u64| (observations as f64 * periods_each + NEARLY).floor();
         self.asked == 0 || begun(self.asked) > begun(self.asked - 1)
     }
 
     /// Puts estimated velocities into the row: the way since the last control period over its time. The arm is at rest at first.
     fn estimate(&mut self, row: &mut [f32]) {
-        if !self.host.options.estimate_dq {
+        if !self.acting.options.estimate_dq {
             return;
         }
-        let layout = self.host.rows.layout();
+        let layout = self.acting.rows.layout();
         let q = row[layout.positions()].to_vec();
         if let Some((then, before)) = &self.before {
-            let each_s = self.host.options.robot_rate_hz.map_or(layout.period_s, |hz| 1.0 / hz);
+            let each_s = self.acting.options.robot_rate_hz.map_or(layout.period_s, |hz| 1.0 / hz);
             let time_s = ((self.asked - then) as f64 * each_s) as f32;
             let names = layout.state.iter().flat_map(|span| &span.entries);
             for (i, name) in names.skip(layout.positions().start).take(q.len()).enumerate() {
@@ -149,7 +182,7 @@ impl<'a> Session<'a> {
     fn command(&self, row: &[f32], due: bool) -> Value<'static> {
         let finite = self.held.iter().all(|v| v.is_finite());
         let mut action = if finite { self.held.clone() } else { vec![0.0; self.held.len()] };
-        let limited = self.host.bounds.apply(&row[self.host.rows.layout().positions()], &mut action);
+        let limited = self.acting.bounds.apply(&row[self.acting.rows.layout().positions()], &mut action);
         let mut answer = Value::map([("actions", self.actions(&action))]);
         if !limited.is_empty() {
             let Limited { velocity, position } = limited;
