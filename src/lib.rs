@@ -37,6 +37,7 @@
 //! - [`learn`]: networks of policy and dynamics, losses, methods, and the loop around them; knows neither files nor simulator
 //! - [`eval`]: policies in the simulator
 //! - [`export`]: policies for programs that are not hilt
+//! - [`serve`]: policies and worlds over a wire, for programs of others; and theirs for hilt
 //! - [`experiment`]: grids of runs as steps; starts no process
 //! - [`report`]: pictures, charts, tables, statistics over seeds, pages of experiments
 //! - [`cmd`]: the command line
@@ -64,6 +65,7 @@ pub mod report;
 pub mod robot;
 pub mod scene;
 pub mod seed;
+pub mod serve;
 pub mod sim;
 pub mod state;
 pub mod table;

@@ -98,7 +98,8 @@ impl Scene {
     /// Everything but robot and task.
     pub fn to_json(&self) -> Value {
         let Scene { objects, goals, obstacles, finger_friction, .. } = self.clone();
-        serde_json::to_value(SceneFile { objects, goals, obstacles, finger_friction }).expect("a scene is plain data with text keys")
+        serde_json::to_value(SceneFile { objects, goals, obstacles, finger_friction })
+            .expect("a scene is plain data with text keys")
     }
 
     /// The inverse of [`Scene::to_json`], also of files from when there were one block, and a goal or a base block.
@@ -115,7 +116,8 @@ impl Scene {
             let (friction, mass_kg) = (older.friction, older.block_mass_kg);
             return Ok(Scene::of_older(robot, task, (older.block, older.context), (friction, mass_kg), older.obstacles));
         }
-        let SceneFile { objects, goals, obstacles, finger_friction } = serde_json::from_value(value).map_err(|e| e.to_string())?;
+        let SceneFile { objects, goals, obstacles, finger_friction } =
+            serde_json::from_value(value).map_err(|e| e.to_string())?;
         Ok(Scene { robot: Arc::clone(robot), task: Arc::clone(task), objects, goals, obstacles, finger_friction })
     }
 

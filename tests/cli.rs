@@ -3,8 +3,20 @@
 use assert_cmd::Command;
 use std::fs;
 
-const STAGES: [&str; 10] =
-    ["plan", "simulate", "convert", "pretrain", "train", "evaluate", "inspect", "render", "settings", "export"];
+const STAGES: [&str; 12] = [
+    "plan",
+    "simulate",
+    "convert",
+    "pretrain",
+    "train",
+    "evaluate",
+    "inspect",
+    "render",
+    "settings",
+    "export",
+    "serve",
+    "serve-env",
+];
 
 fn hilt(words: &[&str]) -> Command {
     let mut command = Command::cargo_bin("hilt").expect("the binary is built with the tests");

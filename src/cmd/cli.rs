@@ -2,7 +2,10 @@
 
 use super::console::Console;
 use super::context::{Context, Outcome};
-use super::{convert, dataset, evaluate, experiment, export, inspect, plan, pretrain, render, report, robot, settings, simulate, train};
+use super::{
+    convert, dataset, evaluate, experiment, export, inspect, plan, pretrain, render, report, robot, serve, serve_env, settings,
+    simulate, train,
+};
 use crate::error::{Error, Result};
 use crate::interrupt::Interrupt;
 use clap::{Parser, Subcommand};
@@ -55,6 +58,8 @@ enum Command {
     Report(report::Args),
     Robot(robot::Args),
     Export(export::Args),
+    Serve(serve::Args),
+    ServeEnv(serve_env::Args),
 }
 
 impl Cli {
@@ -83,6 +88,8 @@ impl Cli {
             Command::Export(args) => export::run(args, &context),
             Command::Dataset(args) if dataset::only_answers(args) => return dataset::run(args, &context),
             Command::Dataset(args) => dataset::run(args, &context),
+            Command::Serve(args) => serve::run(args, &context),
+            Command::ServeEnv(args) => serve_env::run(args, &context),
             Command::Inspect(args) => return inspect::run(args, &context),
             Command::Render(args) => render::run(args, &context),
             Command::Robot(args) => return robot::run(args, &context),

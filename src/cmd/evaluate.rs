@@ -1,37 +1,32 @@
-use super::common::{SettingsArgs, path_or, read_network};
+use super::common::{SettingsArgs, path_or};
 use super::places::{Content, Places, beside};
-use super::{Console, Context, Outcome, output, train};
-use crate::config::{Pipeline, Stage};
+use super::subject::{Chosen, ServedArgs, Subject};
+use super::{Console, Context, Outcome, output};
+use crate::config::Stage;
 use crate::data::differences::{Difference, differences};
 use crate::data::provenance::Provenance;
-use crate::data::{ContentHash, atomic, json_file, recording, table_file};
+use crate::data::{atomic, json_file, recording, table_file};
 use crate::demo::Episode;
 use crate::error::{Error, Result};
-use crate::eval::{PolicyController, Rollouts, Summary, Trial, to_table};
-use crate::interrupt::Interrupt;
-use crate::learn::Policy;
-use crate::plan::Planner;
+use crate::eval::{Rollouts, Summary, Trial, to_table};
 use crate::report::table::text_table;
 use crate::scene::Scene;
-use crate::seed;
-use crate::sim::{Controller, Follower};
 use serde::Serialize;
 use serde_json::Value;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
-
-/// The demonstrator's name where a policy's file could stand.
-const PLANNER: &str = "planner";
 
 /// Run a policy on seeded episodes that no demonstration used: success with its 95 % interval, conditions, failure classes.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     #[command(flatten)]
     settings: SettingsArgs,
-    /// Weights of a policy, or "planner" for the demonstrator itself [default: runs/<TASK>/policy.safetensors]
-    #[arg(long, value_name = "planner|FILE")]
+    /// Weights of a policy, "planner" for the demonstrator itself, or the address of a policy that somebody serves [default:
+    /// runs/<TASK>/policy.safetensors]
+    #[arg(long, value_name = "planner|FILE|ws://HOST:PORT")]
     policy: Option<PathBuf>,
+    #[command(flatten)]
+    served: ServedArgs,
     /// Episodes [default: evaluate.episodes]
     #[arg(long, value_name = "N")]
     episodes: Option<u64>,
@@ -49,14 +44,6 @@ pub struct Args {
     record: Option<PathBuf>,
 }
 
-/// Who acts.
-enum Subject {
-    /// The demonstrator, in the loop.
-    Planner,
-    /// A learned policy.
-    Policy(Arc<Policy>),
-}
-
 pub fn run(args: &Args, context: &Context) -> Result<Outcome> {
     let episodes = ("evaluate.episodes", args.episodes.map(|n| n.to_string()));
     let stochastic = ("evaluate.stochastic", args.stochastic.then(|| "true".to_string()));
@@ -64,17 +51,12 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome> {
     let path = path_or(args.policy.as_deref(), &pipeline, "policy.safetensors");
     let log = args.out.as_deref().map(|out| beside(out, "episodes.parquet"));
     args.places(&path, log.as_deref()).check(&context.console)?;
-    let (subject, inputs, trained) = match path.as_path() {
-        planner if planner == Path::new(PLANNER) => (Subject::Planner, vec![], None),
-        file => {
-            let (policy, made, content) = read_policy(file, &pipeline)?;
-            (Subject::Policy(Arc::new(policy)), vec![("policy", content)], Some(made.settings))
-        }
-    };
+    let Chosen { subject, content, trained, said } = Chosen::read(&path, &args.served, &pipeline, &context.interrupt)?;
+    let inputs: Vec<_> = content.map(|content| ("policy", content)).into_iter().collect();
     let horizon_steps = subject.horizon_steps(&pipeline);
     let mut provenance = args.settings.provenance(Stage::Evaluate, &pipeline, &inputs)?;
     provenance.settings["evaluate"]["horizon_steps"] = horizon_steps.into();
-    provenance.settings["policy"] = if inputs.is_empty() { PLANNER } else { train::KIND }.into();
+    provenance.settings["policy"] = said;
 
     let foreign = trained.map(|trained| of_scene(&trained, &provenance.settings)).unwrap_or_default();
     say_of_scene(&foreign, &context.console);
@@ -100,7 +82,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome> {
 
 impl Args {
     fn places(&self, policy: &Path, log: Option<&Path>) -> Places {
-        let mut places = self.settings.places().read_all(Some(policy).filter(|path| *path != Path::new(PLANNER)));
+        let mut places = self.settings.places().read_all(Chosen::file(policy)).read_all(self.served.reads());
         if let (Some(out), Some(log)) = (&self.out, log) {
             places = places.write("--out", out, Content::Summary("evaluate"));
             places = places.write("the log of the episodes", log, Content::Table("evaluate"));
@@ -112,12 +94,13 @@ impl Args {
     }
 }
 
-fn read_policy(path: &Path, pipeline: &Pipeline) -> Result<(Policy, Provenance, ContentHash)> {
-    read_network(path, train::KIND, pipeline, Policy::from_tensors, |policy| policy.layout())
-}
-
 /// Sections of the settings that make an episode what it is.
 const WORLD: [&str; 3] = ["scene", "simulate", "robot"];
+
+/// Those sections of a policy's settings.
+pub(super) fn world(settings: &Value) -> Value {
+    WORLD.iter().map(|section| (section.to_string(), settings[*section].clone())).collect()
+}
 
 /// In what the episodes differ from those that the policy was trained for.
 fn of_scene(trained: &Value, here: &Value) -> Vec<Difference> {
@@ -157,45 +140,17 @@ impl<'a> Stated<'a> {
     }
 }
 
-impl Subject {
-    /// As set; otherwise the policy's own (twice the 95th percentile of its demos), or the demonstrator's patience.
-    fn horizon_steps(&self, pipeline: &Pipeline) -> u32 {
-        match (pipeline.evaluate.horizon_steps, self) {
-            (0, Subject::Planner) => pipeline.simulate.max_steps,
-            (0, Subject::Policy(policy)) => policy.horizon_steps(),
-            (given, _) => given,
-        }
-    }
-
-    /// A controller for one episode; `None` when the demonstrator finds no plan.
-    fn controller(&self, rollouts: &Rollouts, index: u64, scene: &Scene, interrupt: &Interrupt) -> Option<Box<dyn Controller>> {
-        match self {
-            Subject::Planner => {
-                let mut rng = seed::stream(rollouts.seed, "evaluate.search", index);
-                let mut planner = Planner::new(&rollouts.pipeline.robot, &rollouts.pipeline.task, &rollouts.pipeline.plan);
-                planner = planner.with_interrupt(interrupt);
-                let plan = planner.plan(index, scene, &mut rng).ok()?;
-                Some(Box::new(Follower::new(&plan)?))
-            }
-            Subject::Policy(policy) => {
-                let stochastic = rollouts.pipeline.evaluate.stochastic;
-                let sampling = stochastic.then(|| seed::stream(rollouts.seed, "evaluate.action", index));
-                Some(Box::new(PolicyController::new(Arc::clone(policy), sampling)))
-            }
-        }
-    }
-}
-
 fn run_all<K>(rollouts: &Rollouts, subject: &Subject, context: &Context, keep: K) -> Result<Vec<Trial>>
 where
     K: Fn(&Episode) -> Result<()> + Sync,
 {
     let progress = context.console.progress("evaluate", rollouts.episodes, "episodes");
     let make = |index, scene: &Scene| {
-        let controller = subject.controller(rollouts, index, scene, &context.interrupt);
+        let controller = subject.controller(rollouts, index, scene, &context.interrupt)?;
         context.interrupt.check().map(|()| controller)
     };
     let trials = rollouts.run(make, &context.interrupt, |episode| {
+        subject.check()?;
         progress.step();
         episode.map_or(Ok(()), &keep)
     })?;

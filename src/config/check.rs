@@ -1,8 +1,8 @@
 //! Refuses settings that are unknown, of a wrong type or out of range, and says what is allowed.
 
+use super::Pipeline;
 use super::ranges::MOST_OBSTACLES;
 use super::ranges::{RANGES, Range};
-use super::Pipeline;
 use crate::error::{Error, Result};
 use crate::scene::Obstacle;
 use crate::task::{Spread, built_in};

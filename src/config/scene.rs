@@ -180,6 +180,11 @@ pub struct SimulateSettings {
 
 impl Default for SimulateSettings {
     fn default() -> Self {
-        SimulateSettings { noise_variance: 0.001, delay_steps: Spread::Fixed(0.0), max_steps: 400, pulses: PulseSettings::default() }
+        SimulateSettings {
+            noise_variance: 0.001,
+            delay_steps: Spread::Fixed(0.0),
+            max_steps: 400,
+            pulses: PulseSettings::default(),
+        }
     }
 }

@@ -47,7 +47,8 @@ pub struct Trial {
 }
 
 impl Trial {
-    fn of(episode: &Episode) -> Self {
+    /// What is kept of an episode.
+    pub fn of(episode: &Episode) -> Self {
         let moments = || episode.steps.iter().chain([&episode.last]);
         Trial {
             index: episode.index,
@@ -91,6 +92,11 @@ impl<'a> Rollouts<'a> {
         Rollouts { pipeline, seed, purpose: "select", episodes: pipeline.train.select_episodes, pulses: false, horizon_steps }
     }
 
+    /// Episodes for others to learn in: as an evaluation's, but none of them is one of an evaluation, a selection or a demonstration.
+    pub fn training(pipeline: &'a Pipeline, seed: u64, horizon_steps: u32) -> Self {
+        Rollouts { purpose: "environment", ..Rollouts::evaluation(pipeline, seed, horizon_steps) }
+    }
+
     fn stream(&self, of: &str, index: u64) -> ChaCha8Rng {
         seed::stream(self.seed, &format!("{}.{of}", self.purpose), index)
     }
@@ -119,21 +125,26 @@ impl<'a> Rollouts<'a> {
     where
         F: Fn(u64, &Scene) -> Result<Option<Box<dyn Controller>>> + Sync,
     {
-        let settings = self.disturbances();
         (0..self.episodes)
             .into_par_iter()
             .map(|index| {
                 interrupt.check()?;
                 let scene = self.scene(index)?;
-                let run = |mut controller: Box<dyn Controller>| {
-                    let mut disturbance = Disturbance::new(&scene.robot, &settings, self.stream("noise", index));
-                    run_episode(index, &scene, controller.as_mut(), &mut disturbance, self.horizon_steps, interrupt)
-                };
+                let run = |mut controller: Box<dyn Controller>| self.play(index, &scene, controller.as_mut(), interrupt);
                 let episode = make_controller(index, &scene)?.map(run).transpose()?;
                 done(episode.as_ref())?;
                 Ok(episode.map_or_else(|| unplanned(index, scene), |episode| Trial::of(&episode)))
             })
             .collect()
+    }
+
+    /// Runs episode `index`, in its scene.
+    ///
+    /// # Errors
+    /// [`crate::error::Error::Interrupted`].
+    pub fn play(&self, index: u64, scene: &Scene, controller: &mut dyn Controller, interrupt: &Interrupt) -> Result<Episode> {
+        let mut disturbance = Disturbance::new(&scene.robot, &self.disturbances(), self.stream("noise", index));
+        run_episode(index, scene, controller, &mut disturbance, self.horizon_steps, interrupt)
     }
 
     /// The noise of the demonstrations, with or without their pulses.

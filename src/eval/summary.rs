@@ -78,7 +78,14 @@ mod tests {
 
     fn trial(index: u64, failure: Option<FailureClass>, steps: u64) -> Trial {
         let block = Placed { pose: Pose::from_yaw([0.4, 0.0, 0.025], 0.0), friction: 1.0, mass_kg: 0.1 };
-        let scene = Scene { robot: paper_robot(), task: pick_up(), objects: vec![block], goals: vec![], obstacles: vec![], finger_friction: 1.0 };
+        let scene = Scene {
+            robot: paper_robot(),
+            task: pick_up(),
+            objects: vec![block],
+            goals: vec![],
+            obstacles: vec![],
+            finger_friction: 1.0,
+        };
         let conditions = vec![true, true, failure.is_none(), failure.is_none(), failure.is_none()];
         Trial { index, scene, success: failure.is_none(), failure, steps, reward: 0.0, conditions, hit_obstacle: false }
     }

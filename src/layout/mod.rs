@@ -157,6 +157,11 @@ impl Layout {
         self.state.iter().filter(|span| !span.holds.is_fixed()).map(|span| span.entries.len()).sum()
     }
 
+    /// How many entries of a state, from the first, are the robot's own: joint positions and velocities. LeRobot has them apart from the rest.
+    pub fn proprioception(&self) -> usize {
+        self.velocities().end.max(self.positions().end)
+    }
+
     /// The spans of a state with their entries.
     pub fn state_spans(&self) -> impl Iterator<Item = (&Span, Range<usize>)> {
         placed(&self.state)

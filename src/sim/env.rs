@@ -97,7 +97,7 @@ impl Env for TaskEnv {
             RewardKind::Staged => verdict.reward,
             RewardKind::Dense => dense(&running.scene, &seen, &verdict, self.gamma),
         };
-        let over = verdict.success || fallen(&seen);
+        let over = verdict.success || fallen(&seen.objects);
         let cut = running.steps >= self.horizon_steps;
         let end = if over { Some(End::Terminated) } else { cut.then_some(End::Truncated) };
         Outcome { reward: reward as f32, end, success: verdict.success }

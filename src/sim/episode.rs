@@ -17,6 +17,9 @@ pub trait Controller {
     /// Joint velocities to ask for \[rad/s, m/s\], given what is seen.
     fn command(&mut self, seen: &Observation) -> Action;
 
+    /// Hears what holds in the moment that [`Controller::command`] is asked about next.
+    fn judged(&mut self, _verdict: &Verdict) {}
+
     /// The part of the plan that the last command belongs to, if there is a plan.
     fn phase(&self) -> Option<Phase> {
         None
@@ -89,8 +92,9 @@ impl<'a> Run<'a> {
             return Ok(End::BrokenDown);
         }
         self.see(first);
-        while !self.verdict.success && self.steps.len() < max_steps as usize && !fallen(&self.seen) {
+        while !self.verdict.success && self.steps.len() < max_steps as usize && !fallen(&self.seen.objects) {
             interrupt.check()?;
+            controller.judged(&self.verdict);
             let commanded = controller.command(&self.seen).map(|v| f64::from(v as f32));
             if commanded.iter().any(|v| !v.is_finite()) {
                 return Ok(End::NoCommand);
@@ -139,8 +143,8 @@ fn record(seen: &Observation, verdict: &Verdict, commanded: Action, executed: Ac
 }
 
 /// Whether an object's centre is below the table's top.
-pub(super) fn fallen(seen: &Observation) -> bool {
-    seen.objects.iter().any(|object| object.pose.position_m[2] < 0.0)
+pub fn fallen(objects: &[Body]) -> bool {
+    objects.iter().any(|object| object.pose.position_m[2] < 0.0)
 }
 
 /// Whether every number is one, and none is beyond what can be.

@@ -75,15 +75,33 @@ fn an_evaluation_on_another_scene_than_the_trained_one_says_so() {
 fn a_policy_from_before_a_key_of_the_scene_was_trained_in_the_scene_as_it_is() {
     let policy = concat!(env!("CARGO_MANIFEST_DIR"), "/fixtures/older/policy.safetensors");
     let evaluate = |set: &str| {
-        let words = ["evaluate", "--task", "pick-up", "--policy", policy, "--episodes", "1", "--set", "evaluate.horizon_steps=2", "--set", set];
+        let words = [
+            "evaluate",
+            "--task",
+            "pick-up",
+            "--policy",
+            policy,
+            "--episodes",
+            "1",
+            "--set",
+            "evaluate.horizon_steps=2",
+            "--set",
+            set,
+        ];
         text(&hilt(words.map(String::from).to_vec()).stderr)
     };
     for (set, said) in [
         ("simulate.delay_steps=0", ""),
         ("simulate.delay_steps=2", "simulate.delay_steps is 2.0, the policy was trained with \"missing\": another scene"),
-        ("scene.finger_friction=[0.1,1]", "scene.finger_friction is [0.1,1.0], the policy was trained with \"missing\": another scene"),
+        (
+            "scene.finger_friction=[0.1,1]",
+            "scene.finger_friction is [0.1,1.0], the policy was trained with \"missing\": another scene",
+        ),
     ] {
         let words = evaluate(set);
-        assert!(words.contains(said) && words.matches("another scene").count() == usize::from(!said.is_empty()), "{set}: {words}");
+        assert!(
+            words.contains(said) && words.matches("another scene").count() == usize::from(!said.is_empty()),
+            "{set}: {words}"
+        );
     }
 }

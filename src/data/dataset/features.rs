@@ -44,11 +44,6 @@ impl Feature {
     }
 }
 
-/// Entries of `observation.state`: joint positions and velocities.
-fn proprioception(layout: &Layout) -> usize {
-    layout.velocities().end.max(layout.positions().end)
-}
-
 /// Names of the entries of these spans.
 pub(in crate::data) fn names(spans: &[Span]) -> Vec<String> {
     spans.iter().flat_map(|span| span.entries.iter().cloned()).collect()
@@ -57,7 +52,7 @@ pub(in crate::data) fn names(spans: &[Span]) -> Vec<String> {
 /// All columns, in order.
 pub(super) fn features(layout: &Layout) -> Vec<Feature> {
     let (states, actions) = (names(&layout.state), names(&layout.action));
-    let (body, world) = states.split_at(proprioception(layout));
+    let (body, world) = states.split_at(layout.proprioception());
     let vector = |name, names: &[String], doc| Feature {
         kind: Kind::F32,
         names: Some(names.to_vec()),
@@ -108,7 +103,7 @@ pub(super) fn field(feature: &Feature) -> Field {
 /// The columns of one episode. `number` is its place in the dataset, `first` that of its first frame.
 pub(super) fn cells(features: &[Feature], episode: &DatasetEpisode, number: usize, first: usize) -> Vec<Cells> {
     let (demo, t_end) = (&episode.demo, episode.demo.len());
-    let own = proprioception(demo.layout());
+    let own = demo.layout().proprioception();
     let part = |from: usize, environment: bool| {
         let rows = (from..from + t_end).map(|t| demo.state(t));
         Cells::F32(rows.flat_map(|row| if environment { &row[own..] } else { &row[..own] }).copied().collect())

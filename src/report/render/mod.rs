@@ -219,7 +219,8 @@ mod tests {
     fn still(block: Pose, base: Pose) -> (Scene, Step) {
         let placed = |pose| Placed { pose, friction: 1.0, mass_kg: 0.1 };
         let objects = vec![placed(block), placed(base)];
-        let scene = Scene { robot: paper_robot(), task: stack(), objects, goals: vec![], obstacles: vec![], finger_friction: 1.0 };
+        let scene =
+            Scene { robot: paper_robot(), task: stack(), objects, goals: vec![], obstacles: vec![], finger_friction: 1.0 };
         let step = Step {
             state: scene.start(),
             objects: scene.objects.iter().map(|o| Body { pose: o.pose, speed_m_s: 0.0 }).collect(),
