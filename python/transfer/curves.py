@@ -51,7 +51,7 @@ def run(args):
     found["name"] = args.name
     for condition in conditions():
         episodes = args.episodes if condition in ({}, HARD) else min(args.episodes, args.curve_episodes)
-        if any(r["condition"] == condition and r["episodes"] >= episodes for r in found["results"]):
+        if episodes == 0 or any(r["condition"] == condition and r["episodes"] >= episodes for r in found["results"]):
             continue
         rows = jaco_mujoco.evaluate(args.policy, args.starts, args.robot, condition, episodes, args.seed, args.jobs)
         failed = [i for i, row in enumerate(rows) if not row["success"]]
@@ -100,7 +100,7 @@ def main():
     one.add_argument("--robot", required=True)
     one.add_argument("--name", required=True, help="what the line is called in the picture")
     one.add_argument("--episodes", type=int, default=500, help="on the nominal arm and with everything drawn")
-    one.add_argument("--curve-episodes", type=int, default=50, help="for each point of a curve")
+    one.add_argument("--curve-episodes", type=int, default=50, help="for each point of a curve; 0: no curves")
     one.add_argument("--seed", type=int, default=0)
     one.add_argument("--jobs", type=int, default=os.cpu_count())
     one.add_argument("--out", required=True, help="FILE.json")
