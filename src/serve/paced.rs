@@ -59,13 +59,15 @@ impl Paced {
 
 /// Whether nothing came for a tick.
 pub fn is_tick(error: &io::Error) -> bool {
-    matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut | ErrorKind::Interrupted)
+    matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut)
 }
 
 impl Read for Paced {
     fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
         self.hurry()?;
-        let count = self.stream.read(buffer)?;
+        // A signal ends a wait before its flag is up: one tick more, and it is.
+        let early = |e: io::Error| if e.kind() == ErrorKind::Interrupted { ErrorKind::WouldBlock.into() } else { e };
+        let count = self.stream.read(buffer).map_err(early)?;
         self.since.get_or_insert_with(Instant::now);
         Ok(count)
     }
@@ -73,8 +75,13 @@ impl Read for Paced {
 
 impl Write for Paced {
     fn write(&mut self, buffer: &[u8]) -> io::Result<usize> {
-        self.interrupt.check().map_err(|e: Error| io::Error::new(ErrorKind::ConnectionAborted, e.to_string()))?;
-        self.stream.write(buffer)
+        loop {
+            self.interrupt.check().map_err(|e: Error| io::Error::new(ErrorKind::ConnectionAborted, e.to_string()))?;
+            match self.stream.write(buffer) {
+                Err(e) if e.kind() == ErrorKind::Interrupted => {}
+                written => return written,
+            }
+        }
     }
 
     fn flush(&mut self) -> io::Result<()> {
