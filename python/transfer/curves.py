@@ -50,7 +50,7 @@ def run(args):
         raise SystemExit(f"error: {out} is of another policy or seed: remove it, or give another --out")
     found["name"] = args.name
     for condition in conditions():
-        episodes = args.episodes if condition in ({}, HARD) else min(args.episodes, args.curve_episodes)
+        episodes = args.episodes if not condition else min(args.episodes, args.curve_episodes)
         if episodes == 0 or any(r["condition"] == condition and r["episodes"] >= episodes for r in found["results"]):
             continue
         rows = jaco_mujoco.evaluate(args.policy, args.starts, args.robot, condition, episodes, args.seed, args.jobs)
@@ -99,8 +99,8 @@ def main():
     one.add_argument("--starts", required=True)
     one.add_argument("--robot", required=True)
     one.add_argument("--name", required=True, help="what the line is called in the picture")
-    one.add_argument("--episodes", type=int, default=500, help="on the nominal arm and with everything drawn")
-    one.add_argument("--curve-episodes", type=int, default=50, help="for each point of a curve; 0: no curves")
+    one.add_argument("--episodes", type=int, default=500, help="on the nominal arm")
+    one.add_argument("--curve-episodes", type=int, default=50, help="for each point of a curve, and with everything drawn at once; 0: none")
     one.add_argument("--seed", type=int, default=0)
     one.add_argument("--jobs", type=int, default=os.cpu_count())
     one.add_argument("--out", required=True, help="FILE.json")

@@ -57,7 +57,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome> {
     let (tensors, description, made, content) = weights::read_hashed(&args.policy, train::KIND)?;
     let refuse = |why: String| Error::input(&args.policy, why);
     let policy = Policy::from_tensors(&tensors, &with_layout(description)).map_err(refuse)?;
-    let robot = robot(args, &made)?;
+    let robot = robot(args, &policy, &made)?;
     let mut about = Map::new();
     about.insert("policy".into(), json!(content.to_string()));
     about.insert("trained_with".into(), evaluate::world(&made.settings));
@@ -73,11 +73,22 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome> {
         let words = "each action holds longer than it was learned for";
         context.console.say(&format!("serve: the robot asks at {hz} Hz, the policy was trained at {policy_hz:.4} Hz: {words}"));
     }
-    args.listen.serve(&PolicyHost::new(policy, &robot, options, about).map_err(refuse)?, context)
+    args.listen.serve(&PolicyHost::new(policy, robot.as_ref().map(|robot| &***robot), options, about).map_err(refuse)?, context)
 }
 
-/// The robot that the policy was made for: limits of another would be no limits.
-fn robot(args: &Args, made: &Provenance) -> Result<ChosenRobot> {
+/// The robot that the policy was made for: limits of another would be no limits. Of a policy that has learned from a dataset of another
+/// program it is not known.
+fn robot(args: &Args, policy: &Policy, made: &Provenance) -> Result<Option<ChosenRobot>> {
+    if policy.layout().positions().is_empty() {
+        return match &args.robot {
+            None => Ok(None),
+            Some(said) => {
+                let why =
+                    "has learned from a dataset that says nothing of joints: no limits of a robot fit it; leave --robot out";
+                Err(Error::Usage(format!("--robot {said}: {} {why}", args.policy.display())))
+            }
+        };
+    }
     let Value::String(theirs) = made.settings["robot"].get("name").cloned().unwrap_or_else(|| "jaco".into()) else {
         return Err(Error::input(&args.policy, "says no name of its robot"));
     };
@@ -90,7 +101,7 @@ fn robot(args: &Args, made: &Provenance) -> Result<ChosenRobot> {
         Some(content) => content == robot.content(),
     };
     if same {
-        Ok(robot)
+        Ok(Some(robot))
     } else {
         Err(Error::Usage(format!("{advice} ({said} is another robot, or its files have changed since)")))
     }

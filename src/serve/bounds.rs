@@ -30,8 +30,12 @@ impl Limited {
 }
 
 impl Bounds {
-    /// Of a robot whose rows the layout describes, and whose commands last `step_s`.
-    pub fn new(layout: &Layout, robot: &Robot, step_s: f64) -> Self {
+    /// Of a robot whose rows the layout describes, and whose commands last `step_s`. Of no known robot there are none.
+    pub fn new(layout: &Layout, robot: Option<&Robot>, step_s: f64) -> Self {
+        let Some(robot) = robot else {
+            let entries = layout.action_dim();
+            return Bounds { velocity: vec![f32::INFINITY; entries], position: vec![None; entries], step_s: step_s as f32 };
+        };
         let known = |i: usize| layout.action_limits.get(i).copied().unwrap_or(robot.joints[i].velocity);
         let within = |most: f64| if f64::from(most as f32) > most { (most as f32).next_down() } else { most as f32 };
         let range = |[low, high]: [f64; 2]| [-within(-low), within(high)];
@@ -76,7 +80,7 @@ mod tests {
     #[test]
     fn commands_stay_within_speeds_and_ranges() {
         let robot = named("panda").expect("it is there").expect("it is sound");
-        let bounds = Bounds::new(&stack().layout(&robot), &robot, 0.05);
+        let bounds = Bounds::new(&stack().layout(&robot), Some(&robot), 0.05);
         let [low, high] = robot.joints[0].limits.map(|v| v as f32);
         let most = robot.joints[0].velocity as f32;
         let at = |q0: f32, asked: f32| {
@@ -101,7 +105,7 @@ mod tests {
     #[test]
     fn a_joint_that_turns_freely_has_no_range() {
         let robot = named("jaco").expect("it is there").expect("it is sound");
-        let bounds = Bounds::new(&stack().layout(&robot), &robot, 0.05);
+        let bounds = Bounds::new(&stack().layout(&robot), Some(&robot), 0.05);
         for (joint, range) in robot.joints.iter().zip(bounds.position()) {
             assert_eq!(range.is_none(), joint.continuous, "{}", joint.name);
         }

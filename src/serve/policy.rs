@@ -22,22 +22,23 @@ pub struct PolicyHost {
 }
 
 impl PolicyHost {
-    /// A policy with the robot whose limits hold; `about` are further entries of the metadata.
+    /// A policy with the robot whose limits hold, none where what it drives is not known; `about` are further entries of the metadata.
     ///
     /// # Errors
-    /// When the robot is not the one whose rows the policy has learned from.
+    /// When the robot is not the one whose rows the policy has learned from, or velocities are to be estimated that it does not see.
     pub fn new(
         policy: Policy,
-        robot: &Robot,
+        robot: Option<&Robot>,
         options: PolicyOptions,
         about: serde_json::Map<String, Json>,
     ) -> std::result::Result<Self, String> {
         let layout = Arc::clone(policy.layout());
-        let joints = robot.joints.len();
         let driven = (layout.action_dim(), layout.positions().len());
-        if driven != (joints, joints) {
-            let Robot { name, .. } = robot;
-            return Err(format!("drives {} joints and sees {}; robot {name} has {joints}", driven.0, driven.1));
+        if let Some(Robot { name, joints, .. }) = robot.filter(|robot| driven != (robot.joints.len(), robot.joints.len())) {
+            return Err(format!("drives {} joints and sees {}; robot {name} has {}", driven.0, driven.1, joints.len()));
+        }
+        if options.estimate_dq && layout.velocities().is_empty() {
+            return Err("sees no joint velocities that --estimate-dq could make; leave it out".into());
         }
         let step_s = options.robot_rate_hz.map_or(layout.period_s, |hz| 1.0 / hz);
         let (rows, bounds) = (Rows::new(&layout), Bounds::new(&layout, robot, step_s));
@@ -51,13 +52,13 @@ impl PolicyHost {
         &self.metadata
     }
 
-    fn describe(&self, layout: &Layout, robot: &Robot, about: serde_json::Map<String, Json>) -> Json {
+    fn describe(&self, layout: &Layout, robot: Option<&Robot>, about: serde_json::Map<String, Json>) -> Json {
         let Json::Object(mut all) = json!({
             "server": "hilt",
             "version": env!("CARGO_PKG_VERSION"),
             "kind": "policy",
             "task": layout.name,
-            "robot": robot.name,
+            "robot": robot.map(|robot| &robot.name),
             "period_s": layout.period_s,
             "horizon_steps": self.acting.policy.horizon_steps(),
             "action_horizon": 1,

@@ -1,10 +1,12 @@
-//! Rows of states under the names that LeRobot gives their parts.
+//! Rows of states under the names that LeRobot gives their parts, or under those of the columns that a policy has learned from.
 
 use super::value::Value;
 use crate::config::MOST_STEPS;
 use crate::demo::LARGEST_NUMBER;
 use crate::layout::{Layout, Span};
-use serde_json::{Value as Json, json};
+use serde_json::{Map, Value as Json};
+use std::borrow::Cow;
+use std::ops::Range;
 use std::sync::Arc;
 
 /// The robot's own part of a state row: joint positions, then velocities.
@@ -25,13 +27,24 @@ pub const MOST_HORIZON_STEPS: u32 = 2 * MOST_STEPS;
 #[derive(Clone, Debug)]
 pub struct Rows {
     layout: Arc<Layout>,
-    own: usize,
+    /// The parts that an observation has, in the order of the row.
+    parts: Vec<(String, Range<usize>)>,
+}
+
+/// The robot's own part and the rest; where nothing is known of joints, a part for each column of the dataset.
+fn parts(layout: &Layout) -> Vec<(String, Range<usize>)> {
+    let (own, dim) = (layout.proprioception(), layout.state_dim());
+    if own == 0 {
+        return layout.state_spans().map(|(span, at)| (span.name.clone(), at)).collect();
+    }
+    let parts = [(STATE.to_string(), 0..own), (ENVIRONMENT.to_string(), own..dim)];
+    parts.into_iter().filter(|(_, entries)| !entries.is_empty()).collect()
 }
 
 impl Rows {
     /// Of this layout.
     pub fn new(layout: &Arc<Layout>) -> Self {
-        Rows { layout: Arc::clone(layout), own: layout.proprioception() }
+        Rows { layout: Arc::clone(layout), parts: parts(layout) }
     }
 
     /// What the entries hold.
@@ -39,18 +52,16 @@ impl Rows {
         &self.layout
     }
 
-    /// A row in its two parts.
+    /// A row in its parts.
     pub fn observation(&self, row: &[f32]) -> Value<'static> {
-        let (own, rest) = row.split_at(self.own);
-        let part = |numbers: &[f32]| Value::Array(super::array::Array::f32(&[numbers.len()], numbers));
-        let mut map = Value::map([(STATE, part(own))]);
-        if !rest.is_empty() {
-            map.insert(ENVIRONMENT, part(rest));
-        }
-        map
+        let part = |(key, entries): &(String, Range<usize>)| {
+            let numbers = &row[entries.clone()];
+            (Cow::Owned(key.clone()), Value::Array(super::array::Array::f32(&[numbers.len()], numbers)))
+        };
+        Value::Map(self.parts.iter().map(part).collect())
     }
 
-    /// The row that an observation has: whole under `state`, or in two parts. Without velocities where they are not `needed`; they are zero then.
+    /// The row that an observation has: whole under `state`, or in its parts. Without velocities where they are not `needed`; they are zero then.
     ///
     /// # Errors
     /// Says which keys there are, which must be, and of how many numbers.
@@ -59,16 +70,17 @@ impl Rows {
         let row = if let Some(whole) = observation.get(WHOLE) {
             vector(WHOLE, whole, &[dim])?
         } else {
-            let Some(own) = observation.get(STATE) else { return Err(self.missing(observation, STATE)) };
-            let bare = self.own - velocities.len();
-            let allowed = [self.own, bare];
-            let mut row = vector(STATE, own, if needed { &allowed[..1] } else { &allowed })?;
-            if row.len() == bare {
-                row.splice(velocities.start..velocities.start, vec![0.0; velocities.len()]);
-            }
-            if dim > self.own {
-                let Some(rest) = observation.get(ENVIRONMENT) else { return Err(self.missing(observation, ENVIRONMENT)) };
-                row.extend(vector(ENVIRONMENT, rest, &[dim - self.own])?);
+            let mut row = Vec::with_capacity(dim);
+            for (key, entries) in &self.parts {
+                let Some(part) = observation.get(key) else { return Err(self.missing(observation, key)) };
+                let left_out = if needed || !entries.contains(&velocities.start) { 0 } else { velocities.len() };
+                let allowed = [entries.len(), entries.len() - left_out];
+                let part = vector(key, part, if left_out == 0 { &allowed[..1] } else { &allowed })?;
+                let is_bare = part.len() < entries.len();
+                row.extend(part);
+                if is_bare {
+                    row.splice(velocities.start..velocities.start, vec![0.0; velocities.len()]);
+                }
             }
             row
         };
@@ -85,17 +97,14 @@ impl Rows {
             Value::Map(entries) => entries.iter().map(|(name, _)| name.as_ref()).take(20).collect(),
             _ => vec![],
         };
-        let (own, rest) = (self.own, self.layout.state_dim() - self.own);
-        format!(
-            "no \"{key}\" among the keys {keys:?}; an observation has \"{STATE}\" ({own} numbers) and \"{ENVIRONMENT}\" ({rest})"
-        )
+        let parts = self.parts.iter().map(|(name, entries)| format!("\"{name}\" ({} numbers)", entries.len()));
+        format!("no \"{key}\" among the keys {keys:?}; an observation has {}", parts.collect::<Vec<_>>().join(" and "))
     }
 
     /// The names of the keys' entries, as metadata have them.
     pub fn keys(&self) -> Json {
         let names: Vec<&str> = self.layout.state.iter().flat_map(|span| &span.entries).map(String::as_str).collect();
-        let (own, rest) = names.split_at(self.own);
-        json!({ STATE: own, ENVIRONMENT: rest })
+        Json::Object(self.parts.iter().map(|(key, entries)| (key.clone(), names[entries.clone()].into())).collect::<Map<_, _>>())
     }
 
     /// Names of an action's entries.
@@ -118,8 +127,10 @@ fn vector(name: &str, value: &Value, allowed: &[usize]) -> Result<Vec<f32>, Stri
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::layout::Holds;
     use crate::robot::file::built_in::paper_robot;
     use crate::task::built_in::stack;
+    use serde_json::json;
 
     #[test]
     fn a_row_comes_back_from_its_parts_and_whole() {
@@ -133,6 +144,31 @@ mod tests {
         assert!(rows.row(&Value::of_json(&bare), true).is_err_and(|why| why.contains("18 numbers")));
         let filled = rows.row(&Value::of_json(&bare), false).expect("velocities are not needed");
         assert_eq!((&filled[..9], &filled[9..18], &filled[18..]), (&row[..9], &[0.0; 9][..], &row[18..]));
+    }
+
+    /// The rows of a dataset that says nothing of joints.
+    #[test]
+    fn columns_of_a_dataset_are_the_parts_of_its_rows() {
+        let span = |name: &str, width: usize, holds| Span {
+            name: name.into(),
+            holds,
+            entries: (0..width).map(|i| format!("{name}.{i}")).collect(),
+        };
+        let layout = Layout {
+            state: vec![span("observation.state", 3, Holds::Numbers), span("observation.force", 2, Holds::Numbers)],
+            action: vec![span("action", 2, Holds::Commands)],
+            action_limits: Vec::new(),
+            aims: Vec::new(),
+            arm: None,
+            ..(*stack().layout(&paper_robot())).clone()
+        };
+        let rows = Rows::new(&Arc::new(layout));
+        let observation = json!({ "observation.force": [4, 5], "observation.state": [1, 2, 3], "prompt": "x" });
+        let row = rows.row(&Value::of_json(&observation), false).expect("an observation");
+        assert_eq!(row, [1.0, 2.0, 3.0, 4.0, 5.0]);
+        assert_eq!(rows.keys()["observation.force"], json!(["observation.force.0", "observation.force.1"]));
+        let why = rows.row(&Value::of_json(&json!({ "observation.state": [1, 2, 3] })), true).expect_err("a column is missing");
+        assert!(why.contains("\"observation.state\" (3 numbers) and \"observation.force\" (2 numbers)"), "{why}");
     }
 
     #[test]

@@ -42,7 +42,8 @@ pub struct Acting {
 impl Acting {
     /// Whether it must be told the joint velocities.
     pub fn needs_dq(&self) -> bool {
-        !(self.options.estimate_dq || self.policy.settings().mask_dq)
+        let sees = !self.rows.layout().velocities().is_empty();
+        sees && !(self.options.estimate_dq || self.policy.settings().mask_dq)
     }
 }
 

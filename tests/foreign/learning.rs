@@ -4,10 +4,14 @@ use crate::made::{Made, TINY, contents, done, fixture, hilt, made, refused};
 use arrow_array::{ArrayRef, Float64Array, Int64Array};
 use hilt::data::dataset::foreign::{Choice, open};
 use hilt::data::{table_file, weights};
+use hilt::interrupt::Interrupt;
 use hilt::layout::{Holds, Layout};
+use hilt::learn::Policy;
+use hilt::serve::{Host, LineLink, PolicyHost, PolicyOptions};
 use hilt::table::Values;
 use serde_json::{Value, json};
 use std::fs;
+use std::io::Cursor;
 use std::path::Path;
 use std::sync::Arc;
 use tempfile::tempdir;
@@ -72,6 +76,32 @@ fn fixtures_of_other_programs_train_all_three_methods_to_policies_that_carry_the
         let (table, _) = table_file::read(&run.join("dynamics.errors.parquet")).expect("a table");
         assert_eq!(table.rows(), layout_groups(name));
     }
+}
+
+/// In the user's own simulator or on his robot: by the columns that it has learned from.
+#[test]
+fn a_policy_of_another_programs_dataset_is_served_by_its_columns() {
+    let dir = tempdir().expect("dir");
+    let data = fixture("edited").display().to_string();
+    done(dir.path(), &[&["train", "--method", "bc", "--dataset", &data][..], &TINY].concat());
+    let path = dir.path().join("runs/edited/policy-bc.safetensors");
+    let (tensors, meta, _) = weights::read(&path, weights::POLICY).expect("weights");
+    let policy = Policy::from_tensors(&tensors, &meta).expect("a policy");
+    let row: Vec<f32> = (0..25).map(|i| 0.01 * i as f32).collect();
+    let observation = json!({ "observation.state": row[..18], "observation.environment_state": row[18..] });
+    let host = PolicyHost::new(policy.clone(), None, PolicyOptions::default(), Default::default()).expect("needs no robot");
+    let (mut out, input) = (Vec::new(), format!("{observation}\n"));
+    let mut link = LineLink::new(Cursor::new(input), &mut out, &Interrupt::default()).expect("a thread");
+    host.converse(&mut link, 0).expect("no interrupt");
+    let lines: Vec<Value> = String::from_utf8_lossy(&out).lines().map(|l| serde_json::from_str(l).expect("JSON")).collect();
+    assert_eq!((&lines[0]["robot"], lines[0]["needs_dq"].as_bool()), (&Value::Null, Some(false)));
+    let actions: Vec<f32> = serde_json::from_value(lines[1]["actions"][0].clone()).expect("numbers");
+    assert_eq!(actions, policy.act(&row));
+    let why = PolicyHost::new(policy, None, PolicyOptions { estimate_dq: true, ..Default::default() }, Default::default());
+    assert!(why.expect_err("there are none").contains("sees no joint velocities"));
+    let path = path.display().to_string();
+    let said = refused(dir.path(), &["serve", &path, "--robot", "jaco"], 2);
+    assert!(said.contains("no limits of a robot fit it; leave --robot out"), "{said}");
 }
 
 /// Columns that make a state: each has errors of its own.

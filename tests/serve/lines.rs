@@ -120,7 +120,7 @@ fn an_action_that_is_no_number_becomes_a_stop() {
     }
     let policy = Policy::from_tensors(&tensors, &meta).expect("a policy");
     assert!(policy.act(&row()).iter().any(|v| !v.is_finite()));
-    let host = PolicyHost::new(policy, &paper_robot(), PolicyOptions::default(), Default::default()).expect("the robot's");
+    let host = PolicyHost::new(policy, Some(&paper_robot()), PolicyOptions::default(), Default::default()).expect("the robot's");
     let answers = talk_to(&host, &[whole(&row())]);
     assert_eq!((actions(&answers[0]), &answers[0]["command_not_finite"]), (vec![0.0; 9], &json!(true)));
 }

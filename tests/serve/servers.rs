@@ -35,7 +35,7 @@ pub fn policy() -> Policy {
 
 /// A host of it.
 pub fn host(options: PolicyOptions) -> PolicyHost {
-    PolicyHost::new(policy(), &paper_robot(), options, Default::default()).expect("the robot's policy")
+    PolicyHost::new(policy(), Some(&paper_robot()), options, Default::default()).expect("the robot's policy")
 }
 
 /// A policy server in this process; it ends with the value.
