@@ -95,9 +95,18 @@ fn inspect_knows_an_artefact_by_its_content_and_not_by_its_ending() {
     for (name, kind) in kinds {
         assert_eq!(inspect(&at(name), &Interrupt::default()).expect(name)["kind"], kind);
     }
-    fs::write(at("model.onnx"), b"\x08\x07\x12\x07pytorch").expect("written");
-    let message = refusal(|| inspect(&at("model.onnx"), &Interrupt::default()));
-    assert!(message.contains("no artefact of hilt; expected a recording (MCAP)"), "{message}");
+    for (name, bytes, said) in [
+        ("model.pkl", &b"\x80\x02pytorch"[..], "no artefact of hilt; expected a recording (MCAP)"),
+        (
+            "model.onnx",
+            b"\x08\x07\x12\x07pytorch",
+            "is a network for other programs (ONNX); inspect the policy that it was made of",
+        ),
+    ] {
+        fs::write(at(name), bytes).expect("written");
+        let message = refusal(|| inspect(&at(name), &Interrupt::default()));
+        assert!(message.contains(said), "{message}");
+    }
 }
 
 #[test]
