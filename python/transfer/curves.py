@@ -85,7 +85,7 @@ def plot(args):
                 points = [success(found, {} if value == jaco_mujoco.NOMINAL[key] else {key: value}) for value in values]
                 style = LINES[names.index(found["name"]) % len(LINES)]
                 axis.plot([value * SCALE.get(key, 1) for value in values], points, markersize=3, label=found["name"], **style)
-            axis.set(ylim=(-4, 104), xlabel=label if row is axes[-1] else None)
+            axis.set(ylim=(-4, 104), xlabel=label if task == tasks[-1] else None)
     lines = {text: line for axis in axes.flat for line, text in zip(*axis.get_legend_handles_labels())}
     figure.legend(lines.values(), lines.keys(), loc="outside upper center", ncols=4, frameon=False)
     figure.savefig(args.out, metadata={"Date": None})
