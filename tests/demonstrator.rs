@@ -7,6 +7,7 @@ use hilt::plan::Planner;
 use hilt::robot::file::built_in::names;
 use hilt::seed::stream;
 use hilt::sim::{Disturbance, Follower, run_episode};
+use hilt::task::Spread;
 use hilt::task::built_in::{of_the_paper, pick_up};
 use hilt::tasks::draw_scene;
 use std::path::Path;
@@ -70,6 +71,19 @@ fn the_other_tasks_are_solved_by_every_robot_goal_after_goal() {
                 let lifts = if name == "sort" { 0.0 } else { 1.0 };
                 assert!((paid - goals as f64 * (0.01 + 0.1 + lifts + 10.0)).abs() < 1e-9, "{name} {robot} {index}: {paid}");
             }
+        }
+    }
+}
+
+/// Two fingers push a thumb of little friction away; the cube leans in the hand, touches the table, and comes no lower.
+#[test]
+fn what_leans_in_the_hand_is_put_down() {
+    for task in of_the_paper().into_iter().filter(|task| *task != pick_up()) {
+        let mut pipeline = Pipeline::defaults(&task);
+        pipeline.scene.finger_friction = Spread::Fixed(0.2);
+        for index in 0..EPISODES {
+            let episode = demonstrate(&pipeline, &pipeline.simulate, index);
+            assert!(episode.success, "{task} {index}: {:?}", episode.failure);
         }
     }
 }
