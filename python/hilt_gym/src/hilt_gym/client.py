@@ -1,7 +1,6 @@
 """A client of `hilt serve POLICY`."""
 
-from .process import HiltProcess
-from .wire import Conversation
+from .attached import Attached
 
 
 class PolicyClient:
@@ -11,26 +10,18 @@ class PolicyClient:
     """
 
     def __init__(self, policy=None, *, address=None, token=None, binary=None, arguments=()):
-        self._server, self._wire = None, None
         if (address is None) == (policy is None):
             raise ValueError("give the file of a policy, whose server is started here, or the address of a server")
-        if address is None:
-            self._server = HiltProcess("serve", str(policy), *arguments, binary=binary)
-            address = self._server.address
-        try:
-            self._wire = Conversation(address, token)
-        except BaseException:
-            self.close()
-            raise
-        self.about = self._wire.metadata
+        self._server = Attached("serve", str(policy), *arguments, address=address, token=token, binary=binary)
+        self.about = self._server.metadata
 
     def reset(self, episode=0):
         """Begins an episode: nothing that was seen before counts."""
-        self._wire.ask({"reset": {"episode": int(episode)}})
+        self._server.ask({"reset": {"episode": int(episode)}})
 
     def infer(self, observation):
         """The whole answer to an observation, a dict with LeRobot's keys."""
-        return self._wire.ask(observation)
+        return self._server.ask(observation)
 
     def __call__(self, observation):
         """The first action of the answer."""
@@ -38,12 +29,7 @@ class PolicyClient:
 
     def close(self):
         """Ends the conversation, and the server that was started for it."""
-        if self._wire is not None:
-            self._wire.close()
-            self._wire = None
-        if self._server is not None:
-            self._server.close()
-            self._server = None
+        self._server.close()
 
     def __enter__(self):
         return self

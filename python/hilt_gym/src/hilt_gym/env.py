@@ -4,8 +4,7 @@ import gymnasium
 import numpy as np
 from gymnasium import spaces
 
-from .process import HiltProcess
-from .wire import Conversation
+from .attached import Attached
 
 STATE = "observation.state"
 ENVIRONMENT = "observation.environment_state"
@@ -39,21 +38,13 @@ class HiltEnv(gymnasium.Env):
         binary=None,
         arguments=(),
     ):
-        self._server, self._wire = None, None
         if (address is None) == (task is None):
             raise ValueError("give a task, whose server is started here, or the address of a server")
-        if address is None:
-            self._server = HiltProcess("serve-env", "--task", str(task), *arguments, binary=binary)
-            address = self._server.address
-        try:
-            self._wire = Conversation(address, token)
-            about = self._wire.metadata
-            if about.get("kind") != "environment":
-                raise ValueError(f"{address} serves no environment of hilt's")
-        except BaseException:
+        self._server = Attached("serve-env", "--task", str(task), *arguments, address=address, token=token, binary=binary)
+        self.about = about = self._server.metadata
+        if about.get("kind") != "environment":
             self.close()
-            raise
-        self.about = about
+            raise ValueError(f"{self._server.address} serves no environment of hilt's")
         self._first, self._horizon, self._episodes, self._flat = int(seed), horizon_steps, episodes, flat
         widths = {key: len(names) for key, names in about["keys"].items() if names}
         box = lambda width: spaces.Box(-MOST, MOST, (width,), np.float32)
@@ -80,26 +71,15 @@ class HiltEnv(gymnasium.Env):
             asked.setdefault("seed", int(seed))
             asked.setdefault("episode", 0)
         self._first = None
-        answer = self._wire.ask({"reset": asked})
+        answer = self._server.ask({"reset": asked})
         return self._seen(answer), answer["info"]
 
     def step(self, action):
-        answer = self._wire.ask({"step": {"action": np.asarray(action, np.float32)}})
+        answer = self._server.ask({"step": {"action": np.asarray(action, np.float32)}})
         info = answer["info"]
         # The name under which Stable-Baselines3 and LeRobot look for it.
         info["is_success"] = info["success"]
         return self._seen(answer), float(answer["reward"]), answer["terminated"], answer["truncated"], info
 
     def close(self):
-        if self._wire is not None:
-            self._wire.close()
-            self._wire = None
-        if self._server is not None:
-            self._server.close()
-            self._server = None
-
-    def __enter__(self):
-        return self
-
-    def __exit__(self, *_):
-        self.close()
+        self._server.close()
