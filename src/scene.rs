@@ -43,7 +43,7 @@ pub struct Scene {
     pub goals: Vec<[f64; 3]>,
     /// Fixed boxes to keep clear of.
     pub obstacles: Vec<Obstacle>,
-    /// Dry friction of the fingers' joints, in units of the robot's own.
+    /// Dry friction of the fingers' joints, in units of the robot's own ([`OWN_FRICTION`] where nothing is said).
     pub finger_friction: f64,
 }
 
@@ -54,17 +54,19 @@ struct SceneFile {
     objects: Vec<Placed>,
     goals: Vec<[f64; 3]>,
     obstacles: Vec<Obstacle>,
-    #[serde(default = "as_it_is", skip_serializing_if = "is_as_it_is")]
+    #[serde(default = "own_friction", skip_serializing_if = "is_own_friction")]
     finger_friction: f64,
 }
 
-/// Fingers as the robot's file has them, which is not written down.
-fn as_it_is() -> f64 {
-    1.0
+/// Fingers as the robot's file has them, which files leave unsaid.
+pub const OWN_FRICTION: f64 = 1.0;
+
+fn own_friction() -> f64 {
+    OWN_FRICTION
 }
 
-fn is_as_it_is(share: &f64) -> bool {
-    *share == as_it_is()
+fn is_own_friction(share: &f64) -> bool {
+    *share == OWN_FRICTION
 }
 
 /// The same in files from when there were one block, and a goal or a base block.
@@ -135,7 +137,7 @@ impl Scene {
         }
         let goals = if let OlderContext::Goal(goal) = context { vec![goal] } else { Vec::new() };
         let (robot, task) = (Arc::clone(robot), Arc::clone(task));
-        Scene { robot, task, objects, goals, obstacles, finger_friction: as_it_is() }
+        Scene { robot, task, objects, goals, obstacles, finger_friction: OWN_FRICTION }
     }
 
     /// The state at the start: the arm at rest in its ready pose.

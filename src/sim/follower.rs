@@ -177,8 +177,8 @@ impl Follower {
             }
             Phase::Carry => {
                 let object = Vector3::from(seen.at(course.object)) - course.astray_m(seen);
-                let leans = seen.objects[course.object].pose.uprightness(&course.stood) < cos(LEANING_RAD);
-                let least_m = if leans && seen.touches(course.object) { LEANING_Z_M } else { OPEN_Z_M };
+                let leans = || seen.objects[course.object].pose.uprightness(&course.stood) < cos(LEANING_RAD);
+                let least_m = if seen.touches(course.object) && leans() { LEANING_Z_M } else { OPEN_Z_M };
                 if course.release_m.is_some_and(|to| (object - to).xy().norm() < OPEN_XY_M && object.z - to.z < least_m) {
                     self.enter(Phase::Open);
                 }

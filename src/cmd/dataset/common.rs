@@ -7,6 +7,28 @@ use crate::data::dataset::{TRAIN, VALIDATION};
 use crate::error::{Error, Result};
 use std::path::{Path, PathBuf};
 
+/// One dataset to read, one to write.
+#[derive(Debug, clap::Args)]
+pub struct Ends {
+    /// A LeRobotDataset v3.0
+    #[arg(value_name = "DIR")]
+    pub dataset: PathBuf,
+    /// Directory to write
+    #[arg(long, value_name = "DIR")]
+    pub out: PathBuf,
+}
+
+impl Ends {
+    /// The dataset, when the places are checked.
+    ///
+    /// # Errors
+    /// As [`check_places`] and [`open`].
+    pub fn open(&self, context: &Context) -> Result<Input> {
+        check_places(std::slice::from_ref(&self.dataset), &self.out, context)?;
+        open(&self.dataset)
+    }
+}
+
 /// The roots in a directory: itself, or its datasets train and validation.
 pub fn roots(dir: &Path) -> Vec<PathBuf> {
     let pair: Vec<PathBuf> =

@@ -1,20 +1,15 @@
-use super::common::{check_places, named, open, write};
+use super::common::{Ends, named, write};
 use crate::cmd::{Context, Outcome};
 use crate::data::dataset::edit::{self, Plan};
 use crate::error::{Error, Result};
 use crate::words::did_you_mean;
 use serde_json::json;
-use std::path::PathBuf;
 
 /// Leave out columns or episodes of a dataset.
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// A LeRobotDataset v3.0
-    #[arg(value_name = "DIR")]
-    dataset: PathBuf,
-    /// Directory to write
-    #[arg(long, value_name = "DIR")]
-    out: PathBuf,
+    #[command(flatten)]
+    ends: Ends,
     /// Columns to leave out
     #[arg(long, value_name = "COLUMN,...", value_delimiter = ',')]
     columns: Vec<String>,
@@ -27,8 +22,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome> {
     if args.columns.is_empty() && args.episodes.is_none() {
         return Err(Error::Usage("what is to be dropped? give --columns or --episodes".into()));
     }
-    check_places(std::slice::from_ref(&args.dataset), &args.out, context)?;
-    let input = open(&args.dataset)?;
+    let input = args.ends.open(context)?;
     for name in &args.columns {
         if edit::is_usual(name) {
             return Err(Error::Usage(format!("--columns {name}: every dataset has this column; it cannot be left out")));
@@ -43,5 +37,5 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome> {
         None => vec![true; input.episodes()],
     };
     let said = json!({ "operation": "drop", "columns": args.columns, "episodes": args.episodes });
-    write(&args.out, input, &Plan { said, seed: 0, dropped: args.columns.clone(), normalise: false }, takes, context)
+    write(&args.ends.out, input, &Plan { said, seed: 0, dropped: args.columns.clone(), normalise: false }, takes, context)
 }

@@ -1,19 +1,14 @@
-use super::common::{check_places, named, open, write};
+use super::common::{Ends, named, write};
 use crate::cmd::{Context, Outcome};
 use crate::data::dataset::edit::Plan;
 use crate::error::{Error, Result};
 use serde_json::json;
-use std::path::PathBuf;
 
 /// Keep some episodes of a dataset: those that meet all of the conditions.
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// A LeRobotDataset v3.0
-    #[arg(value_name = "DIR")]
-    dataset: PathBuf,
-    /// Directory to write
-    #[arg(long, value_name = "DIR")]
-    out: PathBuf,
+    #[command(flatten)]
+    ends: Ends,
     /// These episodes, by number: 0-9,12
     #[arg(long, value_name = "LIST")]
     episodes: Option<String>,
@@ -33,8 +28,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome> {
         let message = "which episodes? give --episodes, --min-length, --max-length or --success";
         return Err(Error::Usage(message.into()));
     }
-    check_places(std::slice::from_ref(&args.dataset), &args.out, context)?;
-    let input = open(&args.dataset)?;
+    let input = args.ends.open(context)?;
     let mut takes = match &args.episodes {
         Some(list) => named("--episodes", list, &input)?,
         None => vec![true; input.episodes()],
@@ -49,5 +43,5 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome> {
         "operation": "filter", "episodes": args.episodes, "min_length": args.min_length, "max_length": args.max_length,
         "success": args.success,
     });
-    write(&args.out, input, &Plan { said, seed: 0, dropped: Vec::new(), normalise: false }, takes, context)
+    write(&args.ends.out, input, &Plan { said, seed: 0, dropped: Vec::new(), normalise: false }, takes, context)
 }

@@ -10,7 +10,7 @@ use crate::demo::{Body, Contacts, Episode, Phase, Step, Touch};
 use crate::joints::Joints;
 use crate::robot::Robot;
 use crate::robot::file::built_in::paper_robot;
-use crate::scene::{Obstacle, Placed, Scene};
+use crate::scene::{OWN_FRICTION, Obstacle, Placed, Scene};
 use crate::state::State;
 use crate::task::{FailureClass, Task, built_in};
 use prost::Message;
@@ -134,7 +134,7 @@ fn scene(robot: &Arc<Robot>, task: Option<&Arc<Task>>, message: proto::Scene) ->
                 return Err(format!("its scene has the objects {:?}, which are not those of {task}", names.collect::<Vec<_>>()));
             }
             let objects = message.objects.iter().map(placed).collect::<Result<_, String>>()?;
-            let (goals, finger_friction) = (points(&message.goals)?, message.finger_friction.unwrap_or(1.0));
+            let (goals, finger_friction) = (points(&message.goals)?, message.finger_friction.unwrap_or(OWN_FRICTION));
             Scene { robot, task, objects, goals, obstacles, finger_friction }
         }
         None => older::scene(robot, &built_in::find(&message.task)?, &message, obstacles)?,

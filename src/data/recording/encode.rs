@@ -2,7 +2,7 @@
 
 use crate::data::proto;
 use crate::demo::{Body, Contacts, Episode, Phase, Step, Touch};
-use crate::scene::{Obstacle, Placed, Scene};
+use crate::scene::{OWN_FRICTION, Obstacle, Placed, Scene};
 use crate::state::Pose;
 use crate::task::{FailureClass, Object};
 
@@ -37,7 +37,7 @@ pub(super) fn scene(scene: &Scene) -> proto::Scene {
         obstacles: scene.obstacles.iter().map(obstacle).collect(),
         objects: scene.task.objects.iter().zip(&scene.objects).map(placed).collect(),
         goals: scene.goals.iter().map(point).collect(),
-        finger_friction: (scene.finger_friction != 1.0).then_some(scene.finger_friction),
+        finger_friction: Some(scene.finger_friction).filter(|share| *share != OWN_FRICTION),
         ..proto::Scene::default()
     }
 }
