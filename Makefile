@@ -119,7 +119,7 @@ POLICY     := $(DIR)/policy$(OF).safetensors
 EVALUATION := $(DIR)/evaluation$(OF).json
 ARTEFACTS  := $(PLANS) $(RECORDINGS) $(DATASET) $(DYNAMICS) $(POLICY) $(EVALUATION)
 
-.PHONY: all stages smoke experiment table2 table3 figures report test cluster-test check transfer interop report-test qemu bench fuzz help clean-runs build need-cargo FORCE $(ARTEFACTS)
+.PHONY: all stages smoke experiment table2 table3 figures report test cluster-test check transfer meta-world interop report-test qemu bench fuzz help clean-runs build need-cargo FORCE $(ARTEFACTS)
 
 all: $(EVALUATION) ## run every stage of TASK; writes RUNS/TASK/policy.safetensors and RUNS/TASK/evaluation.json
 	@$(MADE) result
@@ -257,6 +257,9 @@ transfer: ## the policy of TASK on DeepMind's Jaco in MuJoCo, EPISODES of them (
 	@:$(if $(filter-out $(PAPER_TASKS),$(TASK))$(filter-out jaco,$(ROBOT)),$(error make transfer knows the tasks $(PAPER_TASKS) on the jaco, not TASK=$(TASK) ROBOT=$(ROBOT)))
 	@$(MAKE) --no-print-directory all
 	python/transfer/run.sh $(HILT) $(POLICY) $(EVALUATION:.json=.episodes.parquet) $(DIR)/transfer$(OF) $(or $(EPISODES),500) $(call word-of,$(basename $(notdir $(PIPELINE)))$(OF))
+
+meta-world: build ## BC, HIL and two rivals on Meta-World's 50 tasks: RUNS/meta-world (hours; stopped, it goes on; SEEDS, EPISODES, JOBS; needs Python 3.11; docs/meta-world.md)
+	python/meta_world/run.sh $(HILT) $(RUNS)/meta-world $(RUNS)/meta-world-report $(if $(SEEDS),--seeds $(SEEDS)) $(if $(EPISODES),--episodes $(EPISODES)) $(if $(JOBS),--jobs $(JOBS))
 
 interop: build ## tiny runs of all tasks, read by mcap, pyarrow, DuckDB, pandas, LeRobot, safetensors, ONNX (needs Python 3.12)
 	for task in $(TASKS); do $(MAKE) --no-print-directory all TASK=$$task RUNS=$(RUNS)/smoke SET="$(SMOKE)"; done
