@@ -25,6 +25,7 @@ pub mod recording;
 pub mod seal;
 pub mod table_file;
 mod thrift;
+pub mod urdf_file;
 pub mod weights;
 
 pub use content_hash::ContentHash;

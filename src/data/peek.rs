@@ -3,6 +3,7 @@
 use super::onnx::{EXPORT, PRODUCER};
 use super::provenance::KEY;
 use super::seal::find_last;
+use super::urdf_file::MARK;
 use prost::encoding::{WireType, decode_varint};
 use serde_json::Value;
 use std::fs::File;
@@ -48,6 +49,8 @@ pub enum Format {
     Gif,
     /// ONNX.
     Onnx,
+    /// A URDF that hilt wrote.
+    Urdf,
     /// None of these.
     Other,
 }
@@ -97,6 +100,7 @@ pub(super) fn format_of(head: &[u8]) -> Format {
         // Two numbers of the beginning of every ONNX file: its version's field and its producer's.
         [ONNX_VERSION, _, ONNX_PRODUCER, ..] => Format::Onnx,
         _ if head.starts_with(mcap::MAGIC) => Format::Mcap,
+        _ if head.starts_with(MARK.as_bytes()) => Format::Urdf,
         _ => Format::Other,
     }
 }
