@@ -1,6 +1,6 @@
 use super::places::{Content, Places, beside};
 use super::{Context, Outcome, train};
-use crate::data::{atomic, onnx, recording, urdf_file, weights};
+use crate::data::{atomic, marked, onnx, recording, weights};
 use crate::error::{Error, Result};
 use crate::export;
 use crate::learn::Policy;
@@ -29,6 +29,7 @@ enum Format {
 /// of the policy's layout; the file's metadata name every entry, the control period and where the policy comes from. See
 /// docs/run-a-policy.md.
 #[derive(Debug, clap::Args)]
+#[command(after_help = "Example:\n  hilt export onnx policy.safetensors --out policy.onnx")]
 struct OnnxArgs {
     /// Weights of a policy
     #[arg(value_name = "POLICY.safetensors")]
@@ -43,6 +44,7 @@ struct OnnxArgs {
 /// A robot's file has inertia, visual and collision geometry. A recording's is to be looked at: its links are the frames of the recording's
 /// /tf. See docs/open-elsewhere.md.
 #[derive(Debug, clap::Args)]
+#[command(after_help = "Examples:\n  hilt export urdf panda\n  hilt export urdf recordings/episode-00000.mcap --out scene.urdf")]
 struct UrdfArgs {
     /// A robot's TOML file, the name of one that comes with hilt (jaco, panda, ur5e), or a recording
     #[arg(value_name = "NAME|FILE.toml|FILE.mcap")]
@@ -87,7 +89,7 @@ fn to_urdf(args: &UrdfArgs, context: &Context) -> Result<Outcome> {
             )));
         }
     };
-    atomic::write_bytes(&out, &urdf_file::encode(&document))?;
+    atomic::write_bytes(&out, &marked::urdf(&document))?;
     context.console.say(&format!("export: wrote {}", out.display()));
     Ok(Outcome::Done)
 }

@@ -25,6 +25,8 @@ pub enum Content {
     Onnx,
     /// A URDF.
     Urdf,
+    /// A manual page.
+    Man,
     /// A PNG picture.
     Png,
     /// A GIF animation.
@@ -173,6 +175,7 @@ fn check_ending(name: &str, path: &Path, content: Content) -> Result<()> {
         Content::Summary(_) => ("json", "a JSON file"),
         Content::Onnx => ("onnx", "an ONNX file"),
         Content::Urdf => ("urdf", "a URDF"),
+        Content::Man => ("1", "a manual page"),
         Content::Png => ("png", "a PNG picture"),
         Content::Gif => ("gif", "a GIF animation"),
         Content::Log => ("log", "a log"),
@@ -196,7 +199,7 @@ fn check_held(name: &str, path: &Path, content: Content) -> Result<()> {
         Content::Weights(kind, stage) => (Format::Safetensors, Some(stage), Some(kind)),
         Content::Summary(stage) => (Format::Json, Some(stage), None),
         Content::Onnx => (Format::Onnx, Some(onnx::EXPORT), None),
-        Content::Urdf => (Format::Urdf, None, None),
+        Content::Urdf | Content::Man => (Format::Marked, None, None),
         Content::Png => (Format::Png, None, None),
         Content::Gif => (Format::Gif, None, None),
         Content::Log | Content::Report | Content::Pieces | Content::Own => return Ok(()),

@@ -13,6 +13,7 @@ mod inspect;
 pub mod json_file;
 mod json_text;
 mod litter;
+pub mod marked;
 pub mod onnx;
 pub mod origin;
 mod parquet_file;
@@ -25,7 +26,6 @@ pub mod recording;
 pub mod seal;
 pub mod table_file;
 mod thrift;
-pub mod urdf_file;
 pub mod weights;
 
 pub use content_hash::ContentHash;

@@ -1,9 +1,9 @@
 //! What a file is that stands where another is to be written: told from its head and its tail, without reading it whole.
 
+use super::marked;
 use super::onnx::{EXPORT, PRODUCER};
 use super::provenance::KEY;
 use super::seal::find_last;
-use super::urdf_file::MARK;
 use prost::encoding::{WireType, decode_varint};
 use serde_json::Value;
 use std::fs::File;
@@ -49,8 +49,8 @@ pub enum Format {
     Gif,
     /// ONNX.
     Onnx,
-    /// A URDF that hilt wrote.
-    Urdf,
+    /// A text that hilt wrote for other programs.
+    Marked,
     /// None of these.
     Other,
 }
@@ -100,7 +100,7 @@ pub(super) fn format_of(head: &[u8]) -> Format {
         // Two numbers of the beginning of every ONNX file: its version's field and its producer's.
         [ONNX_VERSION, _, ONNX_PRODUCER, ..] => Format::Onnx,
         _ if head.starts_with(mcap::MAGIC) => Format::Mcap,
-        _ if head.starts_with(MARK.as_bytes()) => Format::Urdf,
+        _ if marked::is_ours(head) => Format::Marked,
         _ => Format::Other,
     }
 }

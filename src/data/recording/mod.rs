@@ -36,7 +36,7 @@ use crate::interrupt;
 use crate::robot::urdf;
 use fields::Fields;
 use mcap::records::Metadata;
-use mcap::{Attachment, McapResult, WriteOptions, Writer};
+use mcap::{Attachment, McapResult, WriteOptions};
 use records::{Sections, op};
 use std::borrow::Cow;
 use std::collections::BTreeMap;
