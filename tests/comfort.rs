@@ -31,9 +31,15 @@ fn refused(dir: &Path, words: &[&str], code: i32, parts: &[&str]) {
 fn the_task_and_the_robot_are_those_of_the_artefact() {
     let dir = tempfile::tempdir().expect("a directory");
     let at = dir.path();
-    let said: Value = serde_json::from_str(&ok(at, &["evaluate", "--policy", POLICY, "--episodes", "1", "--json"])).expect("JSON");
+    let said: Value =
+        serde_json::from_str(&ok(at, &["evaluate", "--policy", POLICY, "--episodes", "1", "--json"])).expect("JSON");
     assert_eq!(said["task"], "pick-up");
-    refused(at, &["evaluate", "--policy", POLICY, "--task", "stack"], 1, &["was made for task pick-up, but task stack is asked for"]);
+    refused(
+        at,
+        &["evaluate", "--policy", POLICY, "--task", "stack"],
+        1,
+        &["was made for task pick-up, but task stack is asked for"],
+    );
     refused(at, &["evaluate", "--policy", "missing.safetensors"], 1, &["missing.safetensors"]);
     refused(at, &["evaluate", "--policy", "planner"], 2, &["which task? give --task"]);
     refused(at, &["evaluate"], 2, &["which task? give --task"]);
@@ -48,7 +54,12 @@ fn the_task_and_the_robot_are_those_of_the_artefact() {
     refused(at, &["simulate", "--plans", "panda.parquet", "--robot", "ur5e", "--out", "other"], 1, &["panda.parquet", "panda"]);
     // What a task's own file says no artefact can.
     ok(at, &["plan", "--task", COFFEE, "--episodes", "1", "--out", "coffee.parquet"]);
-    refused(at, &["simulate", "--plans", "coffee.parquet"], 2, &["was made for", "which does not come with hilt", "--task FILE.toml"]);
+    refused(
+        at,
+        &["simulate", "--plans", "coffee.parquet"],
+        2,
+        &["was made for", "which does not come with hilt", "--task FILE.toml"],
+    );
 }
 
 #[test]
@@ -146,7 +157,9 @@ fn colours_are_there_where_they_are_wanted_and_nowhere_else() {
     let said = |variables: &[(&str, &str)]| {
         let mut command = Command::new(env!("CARGO_BIN_EXE_hilt"));
         command.args(["render", "missing.mcap", "--gif"]).current_dir(dir.path());
-        ["NO_COLOR", "CLICOLOR", "CLICOLOR_FORCE"].iter().for_each(|name| drop(command.env_remove(name)));
+        for name in ["NO_COLOR", "CLICOLOR", "CLICOLOR_FORCE"] {
+            command.env_remove(name);
+        }
         let output = command.envs(variables.iter().copied()).output().expect("the binary runs");
         String::from_utf8(output.stderr).expect("UTF-8")
     };

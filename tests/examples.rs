@@ -40,7 +40,11 @@ fn help(words: &[&str]) -> String {
 fn listed(help: &str) -> Vec<String> {
     let lines = help.lines().skip_while(|line| *line != "Commands:").skip(1).take_while(|line| !line.is_empty());
     let names = lines.filter(|line| line.starts_with("  ") && !line.starts_with("   "));
-    names.filter_map(|line| line.split_whitespace().next()).filter(|name| *name != "help").map(String::from).collect()
+    names
+        .filter_map(|line| line.split([' ', ',']).find(|word| !word.is_empty()))
+        .filter(|name| *name != "help")
+        .map(String::from)
+        .collect()
 }
 
 /// Every command that does something, with the examples of its help, in the order of the helps.

@@ -99,16 +99,11 @@ fn styled(line: &str) -> String {
 
 /// A terminal with fewer columns has no room for a bar.
 const NARROW_COLUMNS: u16 = 60;
-/// One with as many has room for the rate too.
-const WIDE_COLUMNS: u16 = 100;
 
-/// The line of a bar for a terminal of so many columns: words come last and are cut where it ends.
+/// The line of a bar for a terminal of so many columns: its words take what is left, and are cut there.
 fn template(columns: u16) -> String {
-    let (bar, rate) = match columns {
-        ..NARROW_COLUMNS => (String::new(), ""),
-        _ => (format!("{{bar:{}.cyan/dim}} ", columns / 5), if columns < WIDE_COLUMNS { "" } else { " {per_sec}" }),
-    };
-    format!("{{prefix:.bold}} {bar}{{pos}}/{{len}}{rate} eta {{eta}} {{wide_msg}}")
+    let bar = if columns < NARROW_COLUMNS { String::new() } else { format!("{{bar:{}.cyan/dim}} ", columns / 5) };
+    format!("{{prefix:.bold}} {bar}{{pos}}/{{len}} {{wide_msg}} eta {{eta}}")
 }
 
 fn open(path: &Path, goes_on: bool) -> Result<File> {
@@ -207,6 +202,5 @@ mod tests {
             assert!(ProgressStyle::with_template(&template(columns)).is_ok(), "{columns}");
         }
         assert!(!template(40).contains("bar") && template(80).contains("{bar:16"), "{}", template(80));
-        assert!(!template(80).contains("per_sec") && template(200).contains("per_sec"));
     }
 }
