@@ -119,7 +119,7 @@ POLICY     := $(DIR)/policy$(OF).safetensors
 EVALUATION := $(DIR)/evaluation$(OF).json
 ARTEFACTS  := $(PLANS) $(RECORDINGS) $(DATASET) $(DYNAMICS) $(POLICY) $(EVALUATION)
 
-.PHONY: all stages smoke experiment table2 table3 figures report test cluster-test check transfer meta-world interop report-test qemu bench fuzz help clean-runs build need-cargo FORCE $(ARTEFACTS)
+.PHONY: all stages smoke experiment table2 table3 figures report test cluster-test check transfer meta-world interop report-test qemu bench fuzz help clean-runs build install need-cargo FORCE $(ARTEFACTS)
 
 all: $(EVALUATION) ## run every stage of TASK; writes RUNS/TASK/policy.safetensors and RUNS/TASK/evaluation.json
 	@$(MADE) result
@@ -226,6 +226,16 @@ $(HILT): $(SOURCES)
 	if test -s "$$built" && ! test "$$built" -ef $@; then mkdir -p $(@D) && ln -sf "$$built" $@; fi
 	@test -s $@ || { echo "make: cargo build has left no $@" >&2; exit 1; }
 	@touch -c $@
+
+PREFIX ?= /usr/local
+install: $(HILT) ## hilt, its manual pages and completions of bash, zsh and fish under PREFIX (/usr/local)
+	install -d $(DESTDIR)$(PREFIX)/bin $(DESTDIR)$(PREFIX)/share/bash-completion/completions \
+	    $(DESTDIR)$(PREFIX)/share/zsh/site-functions $(DESTDIR)$(PREFIX)/share/fish/vendor_completions.d
+	install -m 755 $(HILT) $(DESTDIR)$(PREFIX)/bin/hilt
+	$(HILT) man $(DESTDIR)$(PREFIX)/share/man/man1
+	$(HILT) completions bash > $(DESTDIR)$(PREFIX)/share/bash-completion/completions/hilt
+	$(HILT) completions zsh > $(DESTDIR)$(PREFIX)/share/zsh/site-functions/_hilt
+	$(HILT) completions fish > $(DESTDIR)$(PREFIX)/share/fish/vendor_completions.d/hilt.fish
 
 need-cargo:
 	@command -v cargo > /dev/null || { echo "make: cargo is missing: install Rust from https://rustup.rs and open a new shell" >&2; exit 1; }

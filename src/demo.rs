@@ -117,6 +117,22 @@ pub struct Episode {
 }
 
 /// d = <(s_t^E, a_t^E)>: one demo trajectory, T + 1 states and T actions, row-major f32.
+///
+/// ```
+/// use hilt::demo::Demo;
+/// use hilt::robot::file::built_in::paper_robot;
+/// use hilt::task::built_in::stack;
+/// use std::sync::Arc;
+///
+/// let layout = Arc::new(stack().layout(&paper_robot()));
+/// let (d, a) = (layout.state_dim(), layout.action_dim());
+/// // Three actions, and the states before and after each.
+/// let demo = Demo::new(&layout, vec![0.0; 4 * d], vec![0.1; 3 * a], vec![0.1; 3 * a])?;
+/// assert_eq!((demo.len(), demo.action(2).len()), (3, 9));
+/// let refused = Demo::new(&layout, vec![0.0; 3 * d], vec![0.1; 3 * a], vec![0.1; 3 * a]);
+/// assert!(refused.unwrap_err().contains("3 actions need 128 state numbers"));
+/// # Ok::<(), String>(())
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct Demo {
     layout: Arc<Layout>,

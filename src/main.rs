@@ -2,6 +2,7 @@
 
 use clap::Parser;
 use clap::error::ErrorKind;
+use console::style;
 use hilt::cmd::{Cli, Outcome};
 use hilt::interrupt::{Interrupt, anyone_waits};
 use hilt::nn::kernel;
@@ -38,7 +39,8 @@ fn main() -> ExitCode {
         Ok(cli) => cli,
         Err(e) if e.kind() == ErrorKind::DisplayVersion => {
             // Who closed stdout does not want to know.
-            let _ = writeln!(std::io::stdout(), "{e}kernel: {}", kernel::describe());
+            let commit = option_env!("HILT_COMMIT").unwrap_or("unknown: not built from its repository");
+            let _ = writeln!(std::io::stdout(), "{e}commit: {commit}\nkernel: {}", kernel::describe());
             return ExitCode::SUCCESS;
         }
         Err(e) => e.exit(),
@@ -83,6 +85,6 @@ fn watch(mut signals: Signals, interrupt: &Interrupt) {
 
 fn fail(message: &str, code: u8) -> ExitCode {
     // A closed stderr leaves nobody to tell; the exit code still says it.
-    let _ = writeln!(std::io::stderr(), "error: {message}");
+    let _ = writeln!(std::io::stderr(), "{} {message}", style("error:").for_stderr().red().bold());
     ExitCode::from(code)
 }

@@ -4,12 +4,13 @@ use crate::joints::Joints;
 use crate::robot::Robot;
 use crate::state::{Pose, State};
 use crate::task::Task;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use std::sync::Arc;
 
 /// An axis-aligned box that stands in the workspace, fixed.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Obstacle {
     /// Centre x y z \[m\].

@@ -3,7 +3,7 @@
 use assert_cmd::Command;
 use std::fs;
 
-const STAGES: [&str; 12] = [
+const STAGES: [&str; 15] = [
     "plan",
     "simulate",
     "convert",
@@ -16,6 +16,9 @@ const STAGES: [&str; 12] = [
     "export",
     "serve",
     "serve-env",
+    "doctor",
+    "completions",
+    "man",
 ];
 
 fn hilt(words: &[&str]) -> Command {

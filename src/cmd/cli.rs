@@ -3,12 +3,12 @@
 use super::console::Console;
 use super::context::{Context, Outcome};
 use super::{
-    convert, dataset, evaluate, experiment, export, inspect, plan, pretrain, render, report, robot, serve, serve_env, settings,
-    simulate, train,
+    completions, convert, dataset, doctor, evaluate, experiment, export, inspect, man, plan, pretrain, render, report, robot,
+    serve, serve_env, settings, simulate, train,
 };
 use crate::error::{Error, Result};
 use crate::interrupt::Interrupt;
-use clap::{Parser, Subcommand};
+use clap::{CommandFactory, Parser, Subcommand};
 use rustix::time::{ClockId, clock_gettime};
 use std::path::PathBuf;
 use std::time::Instant;
@@ -60,6 +60,9 @@ enum Command {
     Export(export::Args),
     Serve(serve::Args),
     ServeEnv(serve_env::Args),
+    Doctor(doctor::Args),
+    Completions(completions::Args),
+    Man(man::Args),
 }
 
 impl Cli {
@@ -94,6 +97,9 @@ impl Cli {
             Command::Render(args) => render::run(args, &context),
             Command::Robot(args) => return robot::run(args, &context),
             Command::Settings(args) => return settings::run(args, &context),
+            Command::Doctor(args) => return doctor::run(args, &context),
+            Command::Completions(args) => return completions::run(args, Cli::command(), &context),
+            Command::Man(args) => return man::run(args, Cli::command(), &context),
         };
         if outcome.is_ok() {
             context.console.say(&format!("processor time {:.1} s", processor_s()));

@@ -1,7 +1,9 @@
 //! The flags that all stages share: which settings, which seed.
 
+use super::made_for::MadeFor;
 use super::places::Places;
 use crate::config::{self, ChosenTask, LearningSettings, Pipeline, Preset, Source, Stage};
+use crate::data::origin::Kind;
 use crate::data::{ContentHash, Provenance, weights};
 use crate::error::{Error, Result};
 use crate::layout::Layout;
@@ -18,10 +20,10 @@ pub const RUNS: &str = "runs";
 /// Which settings: a preset of a task or a pipeline file, then `--set`, then flags of the stage.
 #[derive(Debug, clap::Args)]
 pub struct SettingsArgs {
-    /// Task: pick-up, pick-and-place, stack, or the TOML file of another
+    /// Task: pick-up, pick-and-place, stack, or the TOML file of another [default: that of the artefact that is read]
     #[arg(long, value_name = "NAME|FILE.toml")]
     task: Option<String>,
-    /// Robot: jaco, panda, ur5e, or the TOML file of another [default: that of the pipeline, jaco]
+    /// Robot: jaco, panda, ur5e, or the TOML file of another [default: that of the artefact or the pipeline, jaco]
     #[arg(long, value_name = "NAME|FILE.toml")]
     robot: Option<String>,
     /// Pipeline file with the settings of every stage [default: the one of the task that comes with hilt]
@@ -60,9 +62,19 @@ impl SettingsArgs {
     /// # Errors
     /// [`Error::Usage`] when neither task nor pipeline file is given; see [`Pipeline::load`].
     pub fn resolve(&self, flags: &[Flag]) -> Result<Pipeline> {
-        let refuse = |why: String| Error::Usage(format!("--task: {why}"));
-        let read = |said: &str| ChosenTask::read(said).map_err(refuse);
-        let source = match (&self.pipeline, self.task.as_deref()) {
+        self.resolve_from(None, flags)
+    }
+
+    /// As [`SettingsArgs::resolve`]; where neither task nor pipeline file is given, task and robot are those that an artefact was made for.
+    ///
+    /// # Errors
+    /// Also what reading the artefact returns.
+    pub fn resolve_from(&self, artefact: Option<(&Path, Kind)>, flags: &[Flag]) -> Result<Pipeline> {
+        let unsaid = self.task.is_none() && self.pipeline.is_none();
+        let made_for = artefact.filter(|_| unsaid).map(|(path, kind)| MadeFor::read(path, kind)).transpose()?;
+        let robot = self.robot.clone().or_else(|| made_for.as_ref()?.robot.clone());
+        let read = |said: &str| ChosenTask::read(said).map_err(|why| Error::Usage(format!("--task: {why}")));
+        let source = match (&self.pipeline, self.task.as_deref().or(made_for.as_ref().map(|made| made.task.as_str()))) {
             (Some(path), said) => Source::File(path.clone(), said.map(read).transpose()?),
             // A task's file is a pipeline file.
             (None, Some(said)) if self.preset.is_none() && config::is_file(said) => Source::File(said.into(), None),
@@ -72,10 +84,19 @@ impl SettingsArgs {
                 return Err(Error::Usage(format!("which task? give --task ({tasks}, or a file) or --pipeline FILE")));
             }
         };
-        let (sets, given) = self.overrides([&("robot", self.robot.clone())].into_iter().chain(flags));
+        let (sets, given) = self.overrides([&("robot", robot)].into_iter().chain(flags));
         let pipeline = Pipeline::load(&source, &sets).map_err(|e| in_words_of_flags(e, &given))?;
         check_ready_pose(&pipeline.robot, &pipeline.scene)?;
         Ok(pipeline)
+    }
+
+    /// The task that is given, if one is.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] when there is none of this name.
+    pub fn task(&self) -> Result<Option<ChosenTask>> {
+        let read = |said: &str| ChosenTask::read(said).map_err(|why| Error::Usage(format!("--task: {why}")));
+        self.task.as_deref().map(read).transpose()
     }
 
     /// The settings of learning from a dataset of another program in `dir`.

@@ -2,6 +2,7 @@
 
 use crate::error::{Error, Result};
 use crate::interrupt;
+use console::{Term, style};
 use indicatif::{MultiProgress, ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::fs::File;
 use std::io::{IsTerminal, Write, stderr};
@@ -28,7 +29,8 @@ pub struct Console {
 impl Console {
     /// `quiet` keeps stderr for errors; [`Console::open_log`] begins the log.
     pub fn new(quiet: bool, log: Option<&Path>, goes_on: bool) -> Self {
-        let show_bars = !quiet && stderr().is_terminal();
+        // A dumb terminal cannot move its cursor.
+        let show_bars = !quiet && stderr().is_terminal() && std::env::var_os("TERM").is_some_and(|term| term != "dumb");
         let target = if show_bars { ProgressDrawTarget::stderr() } else { ProgressDrawTarget::hidden() };
         let (log_path, log) = (log.map(Path::to_path_buf), OnceLock::new());
         Console { quiet, log_path, goes_on, log, bars: MultiProgress::with_draw_target(target) }
@@ -56,7 +58,7 @@ impl Console {
         self.to_log(line);
         if !self.quiet {
             self.bars.suspend(|| {
-                let _ = writeln!(stderr(), "{line}");
+                let _ = writeln!(stderr(), "{}", styled(line));
             });
         }
     }
@@ -70,8 +72,8 @@ impl Console {
     /// Begins to count `total` items of work, called `unit` ("plans").
     pub fn progress(&self, stage: &str, total: u64, unit: &'static str) -> Progress<'_> {
         let bar = (!self.bars.is_hidden()).then(|| {
-            let style = ProgressStyle::with_template("{prefix} {wide_bar} {pos}/{len} {msg} {per_sec} eta {eta}")
-                .expect("the template of the bar is well formed");
+            let style =
+                ProgressStyle::with_template(&template(Term::stderr().size().1)).expect("the template of the bar is well formed");
             self.bars.add(ProgressBar::new(total).with_style(style).with_prefix(stage.to_string()).with_message(unit))
         });
         Progress {
@@ -85,6 +87,23 @@ impl Console {
             started: Instant::now(),
         }
     }
+}
+
+/// The stage that a line is about, bold where the terminal shows it.
+fn styled(line: &str) -> String {
+    match line.split_once(": ") {
+        Some((stage, rest)) if !stage.contains(' ') => format!("{}: {rest}", style(stage).for_stderr().bold()),
+        _ => line.into(),
+    }
+}
+
+/// A terminal with fewer columns has no room for a bar.
+const NARROW_COLUMNS: u16 = 60;
+
+/// The line of a bar for a terminal of so many columns: its words take what is left, and are cut there.
+fn template(columns: u16) -> String {
+    let bar = if columns < NARROW_COLUMNS { String::new() } else { format!("{{bar:{}.cyan/dim}} ", columns / 5) };
+    format!("{{prefix:.bold}} {bar}{{pos}}/{{len}} {{wide_msg}} eta {{eta}}")
 }
 
 fn open(path: &Path, goes_on: bool) -> Result<File> {
@@ -133,12 +152,22 @@ impl Progress<'_> {
 
     /// One more item is done; `more` words say how it stands.
     pub fn step_with(&self, more: &str) {
-        let done = self.done.fetch_add(1, Ordering::Relaxed) + 1;
+        self.show(self.done.fetch_add(1, Ordering::Relaxed), 1, more);
+    }
+
+    /// So many items are done by now; `more` words say how it stands.
+    pub fn reach(&self, done: u64, more: &str) {
+        let before = self.done.fetch_max(done, Ordering::Relaxed);
+        self.show(before, done.saturating_sub(before), more);
+    }
+
+    fn show(&self, before: u64, new: u64, more: &str) {
+        let (done, total) = (before + new, self.total.max(1));
         if let Some(bar) = &self.bar {
             bar.set_message(format!("{}{more}", self.unit));
-            bar.inc(1);
-        } else if done < self.total && done * PLAIN_LINES / self.total != (done - 1) * PLAIN_LINES / self.total {
-            self.console.say(&format!("{}: {done}/{} {}{more}", self.stage, self.total, self.unit));
+            bar.inc(new);
+        } else if done < total && done * PLAIN_LINES / total != before * PLAIN_LINES / total {
+            self.console.say(&format!("{}: {done}/{total} {}{more}", self.stage, self.unit));
         }
     }
 
@@ -151,5 +180,27 @@ impl Progress<'_> {
         let done = self.done.load(Ordering::Relaxed) - self.before;
         let rate = done as f64 / seconds.max(f64::MIN_POSITIVE);
         self.console.say(&format!("{}: {done} {} in {seconds:.1} s ({rate:.1} per second){more}", self.stage, self.unit));
+    }
+}
+
+impl Drop for Progress<'_> {
+    /// What ends early leaves no bar behind.
+    fn drop(&mut self) {
+        if let Some(bar) = &self.bar {
+            bar.finish_and_clear();
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_bar_leaves_room_for_what_it_counts_on_every_terminal() {
+        for columns in [1, 40, 59, 60, 80, 99, 100, 200, u16::MAX] {
+            assert!(ProgressStyle::with_template(&template(columns)).is_ok(), "{columns}");
+        }
+        assert!(!template(40).contains("bar") && template(80).contains("{bar:16"), "{}", template(80));
     }
 }

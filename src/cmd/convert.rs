@@ -3,6 +3,7 @@ use super::places::Content;
 use super::{Console, Context, Outcome, Progress, dropped};
 use crate::config::{Pipeline, Stage};
 use crate::data::dataset::{self, DatasetEpisode, Episodes, Fingerprint};
+use crate::data::origin::Kind;
 use crate::data::{ContentHash, recording};
 use crate::demo::Episode;
 use crate::error::{Error, Result};
@@ -14,6 +15,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// Turn recordings into two LeRobot datasets, train and validation. Failed episodes are dropped, counted and named.
 #[derive(Debug, clap::Args)]
+#[command(after_help = "Example:\n  hilt convert --recordings recordings --out dataset")]
 pub struct Args {
     #[command(flatten)]
     settings: SettingsArgs,
@@ -47,7 +49,7 @@ struct Found {
 }
 
 pub fn run(args: &Args, context: &Context) -> Result<Outcome> {
-    let pipeline = args.settings.resolve(&[])?;
+    let pipeline = args.settings.resolve_from(args.recordings.as_deref().map(|dir| (dir, Kind::Recordings)), &[])?;
     let dir = path_or(args.recordings.as_deref(), &pipeline, "recordings");
     let out = path_or(args.out.as_deref(), &pipeline, "dataset");
     args.settings.places().read(&dir).write("--out", &out, Content::Datasets).check(&context.console)?;

@@ -1,4 +1,4 @@
-//! The progress of learning: one count per part (pretraining, warm start, Algorithm 1), with the losses as they stand.
+//! The progress of learning: the updates of each part (pretraining, warm start, Algorithm 1), with the losses as they stand.
 
 use super::{Console, Progress};
 use crate::learn::{EpochMetrics, Metric};
@@ -22,11 +22,13 @@ impl<'a> Epochs<'a> {
     pub fn step(&mut self, epoch: &EpochMetrics, metrics: &[Metric]) {
         if self.running.as_ref().is_none_or(|(part, _)| *part != epoch.stage) {
             self.finish();
-            let progress = self.console.progress(&epoch.stage, epoch.epochs, "epochs").since(self.began);
-            self.running = Some((epoch.stage.clone(), progress.after(epoch.epoch - 1)));
+            // Every epoch has as many updates as those so far.
+            let of_epochs = |epochs: u64| epoch.updates * epochs / epoch.epoch;
+            let progress = self.console.progress(&epoch.stage, of_epochs(epoch.epochs), "updates").since(self.began);
+            self.running = Some((epoch.stage.clone(), progress.after(of_epochs(epoch.epoch - 1))));
         }
         if let Some((_, progress)) = &self.running {
-            progress.step_with(&words(epoch, metrics));
+            progress.reach(epoch.updates, &words(epoch, metrics));
         }
     }
 

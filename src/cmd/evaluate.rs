@@ -4,8 +4,9 @@ use super::subject::{Chosen, ServedArgs, Subject};
 use super::{Console, Context, Outcome, output};
 use crate::config::Stage;
 use crate::data::differences::{Difference, differences};
+use crate::data::origin::Kind;
 use crate::data::provenance::Provenance;
-use crate::data::{atomic, json_file, recording, table_file};
+use crate::data::{atomic, json_file, recording, table_file, weights};
 use crate::demo::Episode;
 use crate::error::{Error, Result};
 use crate::eval::{Rollouts, Summary, Trial, to_table};
@@ -18,6 +19,9 @@ use std::path::{Path, PathBuf};
 
 /// Run a policy on seeded episodes that no demonstration used: success with its 95 % interval, conditions, failure classes.
 #[derive(Debug, clap::Args)]
+#[command(
+    after_help = "Examples:\n  hilt evaluate --policy policy.safetensors --episodes 500 --seed 1 --record rollouts --out evaluation.json\n  hilt evaluate --task stack --policy planner --episodes 500 --json"
+)]
 pub struct Args {
     #[command(flatten)]
     settings: SettingsArgs,
@@ -47,7 +51,8 @@ pub struct Args {
 pub fn run(args: &Args, context: &Context) -> Result<Outcome> {
     let episodes = ("evaluate.episodes", args.episodes.map(|n| n.to_string()));
     let stochastic = ("evaluate.stochastic", args.stochastic.then(|| "true".to_string()));
-    let pipeline = args.settings.resolve(&[episodes, stochastic])?;
+    let artefact = args.policy.as_deref().and_then(Chosen::file).map(|path| (path, Kind::Weights(weights::POLICY)));
+    let pipeline = args.settings.resolve_from(artefact, &[episodes, stochastic])?;
     let path = path_or(args.policy.as_deref(), &pipeline, "policy.safetensors");
     let log = args.out.as_deref().map(|out| beside(out, "episodes.parquet"));
     args.places(&path, log.as_deref()).check(&context.console)?;

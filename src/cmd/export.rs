@@ -1,11 +1,13 @@
 use super::places::{Content, Places, beside};
 use super::{Context, Outcome, train};
-use crate::data::{atomic, onnx, weights};
+use crate::data::{atomic, marked, onnx, recording, weights};
 use crate::error::{Error, Result};
 use crate::export;
 use crate::learn::Policy;
+use crate::robot::file::{self, built_in};
+use crate::robot::urdf;
 use crate::tasks::with_layout;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Write what hilt has made for programs that are not hilt.
 #[derive(Debug, clap::Args)]
@@ -18,6 +20,7 @@ pub struct Args {
 enum Format {
     #[command(long_flag = "onnx")]
     Onnx(OnnxArgs),
+    Urdf(UrdfArgs),
 }
 
 /// A policy as ONNX, for any runtime: from the raw state row to the mean action, features and normalisation inside the graph.
@@ -26,6 +29,7 @@ enum Format {
 /// of the policy's layout; the file's metadata name every entry, the control period and where the policy comes from. See
 /// docs/run-a-policy.md.
 #[derive(Debug, clap::Args)]
+#[command(after_help = "Example:\n  hilt export onnx policy.safetensors --out policy.onnx")]
 struct OnnxArgs {
     /// Weights of a policy
     #[arg(value_name = "POLICY.safetensors")]
@@ -35,9 +39,25 @@ struct OnnxArgs {
     out: Option<PathBuf>,
 }
 
+/// A robot as one URDF without meshes, as hilt computes with it; of a recording the robot and all that stands around it.
+///
+/// A robot's file has inertia, visual and collision geometry. A recording's is to be looked at: its links are the frames of the recording's
+/// /tf. See docs/open-elsewhere.md.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Examples:\n  hilt export urdf panda\n  hilt export urdf recordings/episode-00000.mcap --out scene.urdf")]
+struct UrdfArgs {
+    /// A robot's TOML file, the name of one that comes with hilt (jaco, panda, ur5e), or a recording
+    #[arg(value_name = "NAME|FILE.toml|FILE.mcap")]
+    of: PathBuf,
+    /// File to write [default: in the working directory, that name with .urdf]
+    #[arg(long, value_name = "FILE.urdf")]
+    out: Option<PathBuf>,
+}
+
 pub fn run(args: &Args, context: &Context) -> Result<Outcome> {
     match &args.format {
         Format::Onnx(args) => to_onnx(args, context),
+        Format::Urdf(args) => to_urdf(args, context),
     }
 }
 
@@ -48,5 +68,28 @@ fn to_onnx(args: &OnnxArgs, context: &Context) -> Result<Outcome> {
     let policy = Policy::from_tensors(&tensors, &with_layout(description)).map_err(|why| Error::input(&args.policy, why))?;
     atomic::write_bytes(&out, &export::onnx::encode(&policy, &made, &content))?;
     context.console.say(&format!("export: wrote {}, operators of opset {}", out.display(), onnx::OPSET));
+    Ok(Outcome::Done)
+}
+
+fn to_urdf(args: &UrdfArgs, context: &Context) -> Result<Outcome> {
+    let ending = args.of.extension().map(|ending| ending.to_ascii_lowercase());
+    // Not beside it: a directory of recordings is an artefact of its own.
+    let name = || Path::new(args.of.file_name().unwrap_or_default()).with_extension("urdf");
+    let out = args.out.clone().unwrap_or_else(name);
+    let places = if ending.is_some() { Places::new().read(&args.of) } else { Places::new() };
+    places.write("--out", &out, Content::Urdf).check(&context.console)?;
+    let document = match ending.as_deref().and_then(|ending| ending.to_str()) {
+        None => urdf(&built_in::find(&args.of.display().to_string())?),
+        Some("mcap") => recording::scene_urdf(&recording::read(&args.of)?.0.scene),
+        Some("toml") => urdf(&file::read(&args.of)?.robot),
+        Some(_) => {
+            let of = args.of.display();
+            return Err(Error::Usage(format!(
+                "{of}: a URDF is written of a recording (FILE.mcap) or a robot: its TOML file, or the name of one that comes with hilt"
+            )));
+        }
+    };
+    atomic::write_bytes(&out, &marked::urdf(&document))?;
+    context.console.say(&format!("export: wrote {}", out.display()));
     Ok(Outcome::Done)
 }

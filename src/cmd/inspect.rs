@@ -9,6 +9,7 @@ use std::path::{Path, PathBuf};
 
 /// Say what a file or directory of hilt is: provenance, shapes, counts, statistics.
 #[derive(Debug, clap::Args)]
+#[command(after_help = "Examples:\n  hilt inspect policy.safetensors\n  hilt inspect recordings --json")]
 pub struct Args {
     /// Plans, recording, directory of recordings, dataset, weights, metrics or evaluation
     #[arg(value_name = "FILE|DIR")]

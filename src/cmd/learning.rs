@@ -4,6 +4,7 @@ use super::Console;
 use super::common::{FOREIGN, Flag, RUNS, SettingsArgs, path_or, read_network, same_layout, same_task};
 use crate::config::{LearningSettings, Pipeline, PretrainSettings, Stage, TrainSettings};
 use crate::data::dataset::foreign::{self, Choice, Source};
+use crate::data::origin::Kind;
 use crate::data::{ContentHash, Provenance, dataset, weights};
 use crate::demo::Demo;
 use crate::error::{Error, Result};
@@ -62,7 +63,7 @@ impl Learning {
                 "--state and --action choose columns of a dataset of another program; the columns of hilt's own are known";
             return Err(Error::Usage(message.into()));
         }
-        let pipeline = settings.resolve(flags)?;
+        let pipeline = settings.resolve_from(dataset.map(|dir| (dir, Kind::Datasets)), flags)?;
         let dataset = path_or(dataset, &pipeline, "dataset");
         Ok(Learning { subject: Subject::Task(Box::new(pipeline)), dataset })
     }

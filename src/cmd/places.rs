@@ -23,6 +23,10 @@ pub enum Content {
     Summary(&'static str),
     /// A network in ONNX.
     Onnx,
+    /// A URDF.
+    Urdf,
+    /// A manual page.
+    Man,
     /// A PNG picture.
     Png,
     /// A GIF animation.
@@ -44,8 +48,8 @@ pub enum Content {
 }
 
 /// Endings of other formats; what follows another dot belongs to a name (policy-0.1).
-const ENDINGS: [&str; 14] =
-    ["parquet", "safetensors", "onnx", "json", "png", "gif", "log", "mcap", "toml", "txt", "csv", "pt", "pth", "bin"];
+const ENDINGS: [&str; 15] =
+    ["parquet", "safetensors", "onnx", "urdf", "json", "png", "gif", "log", "mcap", "toml", "txt", "csv", "pt", "pth", "bin"];
 
 /// Inputs and outputs of one command.
 #[derive(Debug, Default)]
@@ -170,6 +174,8 @@ fn check_ending(name: &str, path: &Path, content: Content) -> Result<()> {
         Content::Weights(..) => ("safetensors", "a safetensors file"),
         Content::Summary(_) => ("json", "a JSON file"),
         Content::Onnx => ("onnx", "an ONNX file"),
+        Content::Urdf => ("urdf", "a URDF"),
+        Content::Man => ("1", "a manual page"),
         Content::Png => ("png", "a PNG picture"),
         Content::Gif => ("gif", "a GIF animation"),
         Content::Log => ("log", "a log"),
@@ -193,6 +199,7 @@ fn check_held(name: &str, path: &Path, content: Content) -> Result<()> {
         Content::Weights(kind, stage) => (Format::Safetensors, Some(stage), Some(kind)),
         Content::Summary(stage) => (Format::Json, Some(stage), None),
         Content::Onnx => (Format::Onnx, Some(onnx::EXPORT), None),
+        Content::Urdf | Content::Man => (Format::Marked, None, None),
         Content::Png => (Format::Png, None, None),
         Content::Gif => (Format::Gif, None, None),
         Content::Log | Content::Report | Content::Pieces | Content::Own => return Ok(()),

@@ -16,6 +16,9 @@ use std::sync::{Mutex, PoisonError};
 
 /// Plan demonstrations: random scenes, and for each a collision-free, smooth joint trajectory. Stopped, the same command goes on.
 #[derive(Debug, clap::Args)]
+#[command(
+    after_help = "Example:\n  hilt plan --task stack --episodes 20 --out plans.parquet\n  hilt plan --task tower --robot panda --episodes 2 --out tower.parquet"
+)]
 pub struct Args {
     #[command(flatten)]
     settings: SettingsArgs,

@@ -18,6 +18,7 @@ pub const KIND: &str = weights::DYNAMICS;
 
 /// Learn the dynamics network from the demonstrations (Algorithm 4) and report its errors per state group.
 #[derive(Debug, clap::Args)]
+#[command(after_help = "Example:\n  hilt pretrain --dataset dataset --out dynamics.safetensors")]
 pub struct Args {
     #[command(flatten)]
     settings: SettingsArgs,

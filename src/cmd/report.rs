@@ -10,6 +10,7 @@ use std::path::{Path, PathBuf};
 
 /// Write a page of finished experiments: HTML and Markdown, figures as SVG, runs as Parquet. Unfinished ones are shown as far as they are.
 #[derive(Debug, clap::Args)]
+#[command(after_help = "Example:\n  hilt report --runs runs/experiments --out page")]
 pub struct Args {
     /// Names of experiments in pipelines/experiments, or files [default: all there that have finished runs]
     #[arg(value_name = "NAME|FILE.toml")]

@@ -33,6 +33,7 @@ enum Action {
 ///
 /// A robot is two files: a URDF, and a TOML beside it that says what a URDF cannot; those of pipelines/robots are examples.
 #[derive(Debug, clap::Args)]
+#[command(after_help = "Example:\n  hilt robot check ur5e --png ur5e.png")]
 struct CheckArgs {
     /// A robot's TOML file, or the name of one that comes with hilt: jaco, panda
     #[arg(value_name = "FILE.toml|NAME")]

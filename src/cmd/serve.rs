@@ -19,6 +19,9 @@ const RATES_HZ: [f64; 2] = [0.1, 10_000.0];
 /// An observation has LeRobot's keys, observation.state and observation.environment_state; the answer has actions. Commands beyond the
 /// robot's limits are not given. docs/serve.md describes the protocol.
 #[derive(Debug, clap::Args)]
+#[command(
+    after_help = "Examples:\n  hilt serve policy.safetensors --port 8000\n  hilt serve policy.safetensors --stdio < observations.jsonl"
+)]
 pub struct Args {
     /// Weights of a policy
     #[arg(value_name = "POLICY")]

@@ -9,6 +9,7 @@ use crate::serve::WorldHost;
 /// python/hilt_gym makes a Gymnasium environment of it. Episode N of seed S is episode N of `hilt evaluate --seed S`; others are there for
 /// learning. docs/serve.md describes the protocol.
 #[derive(Debug, clap::Args)]
+#[command(after_help = "Example:\n  hilt serve-env --task stack --port 8001")]
 pub struct Args {
     #[command(flatten)]
     settings: SettingsArgs,

@@ -1,20 +1,30 @@
 use super::common::SettingsArgs;
 use super::{Context, Outcome, output};
-use crate::config::Stage;
+use crate::config::{Stage, explain};
 use crate::error::Result;
 
 /// Print the resolved settings of a task as TOML, itself a valid pipeline file.
 #[derive(Debug, clap::Args)]
+#[command(
+    after_help = "Examples:\n  hilt settings --task stack > mine.toml\n  hilt settings --explain train.tau\n  hilt settings --explain simulate --task tower"
+)]
 pub struct Args {
     #[command(flatten)]
     settings: SettingsArgs,
     /// Only the sections that this stage reads: plan, simulate, convert, pretrain, train or evaluate
     #[arg(long, value_name = "STAGE")]
     stage: Option<Stage>,
+    /// Explain a key, a section or all of them instead: meaning, unit, what is allowed, the default, and what each preset says
+    #[arg(long, value_name = "KEY", num_args = 0..=1, default_missing_value = "", conflicts_with = "stage")]
+    explain: Option<String>,
 }
 
 pub fn run(args: &Args, context: &Context) -> Result<Outcome> {
     args.settings.places().check(&context.console)?;
+    if let Some(asked) = &args.explain {
+        let explained = explain(asked, args.settings.task()?.as_ref())?;
+        return output::print(&explained.iter().map(ToString::to_string).collect::<Vec<_>>().join("\n")).map(|()| Outcome::Done);
+    }
     let pipeline = args.settings.resolve(&[])?;
     // What the files of a robot say belongs to the settings, as `make` compares them.
     let robot = &pipeline.robot;

@@ -4,6 +4,7 @@ use super::shard::Shard;
 use super::unfinished::{self, Unfinished};
 use super::{Context, Outcome};
 use crate::config::{Pipeline, SimulateSettings, Stage};
+use crate::data::origin::Kind;
 use crate::data::{Provenance, atomic, recording, table_file};
 use crate::demo::Episode;
 use crate::error::{Error, Result};
@@ -18,6 +19,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 /// Execute plans in contact physics, with noise on every command, and record each episode as an MCAP file. Stopped, the same command goes on.
 #[derive(Debug, clap::Args)]
+#[command(after_help = "Example:\n  hilt simulate --plans plans.parquet --out recordings")]
 pub struct Args {
     #[command(flatten)]
     settings: SettingsArgs,
@@ -36,7 +38,7 @@ pub struct Args {
 }
 
 pub fn run(args: &Args, context: &Context) -> Result<Outcome> {
-    let pipeline = args.settings.resolve(&[])?;
+    let pipeline = args.settings.resolve_from(args.plans.as_deref().map(|path| (path, Kind::Table)), &[])?;
     let path = path_or(args.plans.as_deref(), &pipeline, "plans.parquet");
     let out = path_or(args.out.as_deref(), &pipeline, "recordings");
     let kept = unfinished::beside_dir(&out)?;

@@ -24,6 +24,9 @@ pub const KIND: &str = weights::POLICY;
 /// Learn the policy: hybrid imitation learning (Algorithm 1), behavior cloning (2) or state cloning (3) from demos, reinforcement
 /// learning in the simulator (ppo), or behavior cloning and then both (bc-rl).
 #[derive(Debug, clap::Args)]
+#[command(
+    after_help = "Examples:\n  hilt train --method hil --dataset dataset --dynamics dynamics.safetensors --out policy.safetensors\n  hilt train --method bc --dataset dataset --out policy-bc.safetensors"
+)]
 pub struct Args {
     #[command(flatten)]
     settings: SettingsArgs,

@@ -1,13 +1,14 @@
 //! Settings of behavior cloning and reinforcement learning together.
 
 use super::ppo::RewardKind;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// `[train.bc_rl]`: reinforcement learning that goes on with a policy of behavior cloning and keeps its loss (`hilt train --method bc-rl`).
 /// The cloning before it is that of `--method bc` and has its keys in `[train]`; the rest is `[train.ppo]`, `total_steps` included. Of those
 /// six are without effect: the policy's units and the horizon of an episode are those of the demos, not `action_unit`
 /// and `horizon_steps`; `reward`, `initial_std`, `learning_rate` and `final_learning_rate` are here.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct BcRlSettings {
     /// What a step earns: the paper's milestones. The dense reward teaches more where cloning leaves much to learn, but where the task ends with

@@ -1,12 +1,13 @@
 //! The readings of the paper that can be chosen: one enum a question, one variant an answer.
 
+use schemars::JsonSchema;
 use serde::de::{self, Visitor};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use std::fmt;
 use std::str::FromStr;
 
 /// What a network sees of the state.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum FeatureSet {
     /// The state alone, standardised.
@@ -18,7 +19,7 @@ pub enum FeatureSet {
 }
 
 /// What the dynamics network knows before learning.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Structure {
     /// s' = s + network.
@@ -28,7 +29,7 @@ pub enum Structure {
 }
 
 /// The loss of Eq. 6.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum ModelLoss {
     /// Sum of squares in raw units, as printed.
@@ -40,7 +41,7 @@ pub enum ModelLoss {
 }
 
 /// Units and normalisation of L_BC and L_SC.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Objective {
     /// Sums over a demo in raw units (Eq. 3 and 5), mean over the demos of an update.
@@ -50,7 +51,7 @@ pub enum Objective {
 }
 
 /// Which a_t the losses see.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum ActionChoice {
     /// The mean; the standard deviation learns from the negative log-likelihood alone.
@@ -60,7 +61,7 @@ pub enum ActionChoice {
 }
 
 /// What d_conv measures.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Convergence {
     /// p_t = exp(-1/2 mean_i z_i^2), z_i the error of the mean action over tau demo standard deviations.
@@ -70,7 +71,7 @@ pub enum Convergence {
 }
 
 /// Scale of each state entry in L_SC.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum StateScale {
     /// The standard deviation of the state.
@@ -80,7 +81,7 @@ pub enum StateScale {
 }
 
 /// Which commands of the fingers L_SC teaches.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum FingerCloning {
     /// All.
@@ -96,7 +97,7 @@ pub enum FingerCloning {
 }
 
 /// Which pairs enter the buffer B of Algorithm 3.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Pairs {
     /// The prediction, also where the state is then recovered.

@@ -1,9 +1,10 @@
 //! Settings of the dataset and of the evaluation.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// `[convert]`: recordings to datasets.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct ConvertSettings {
     /// Training episodes per validation episode (paper 4.2: 10:1; 200 episodes split 182/18).
@@ -21,7 +22,7 @@ impl Default for ConvertSettings {
 }
 
 /// `[evaluate]`: seeded rollouts on episodes that no demo used.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct EvaluateSettings {
     /// Episodes.

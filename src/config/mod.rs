@@ -5,6 +5,7 @@ mod bc_rl;
 mod check;
 mod choices;
 mod data;
+mod explain;
 mod learning;
 mod limits;
 mod load;
@@ -24,6 +25,7 @@ pub use choices::{
     ActionChoice, Alpha, Convergence, FeatureSet, FingerCloning, ModelLoss, Objective, Pairs, StateScale, Structure,
 };
 pub use data::{ConvertSettings, EvaluateSettings};
+pub use explain::{Explained, explain};
 pub use learning::LearningSettings;
 pub use load::Source;
 pub use ppo::{PpoSettings, RewardKind};
@@ -39,18 +41,31 @@ pub use train::TrainSettings;
 use crate::error::{Error, Result};
 use crate::task::Task;
 use crate::words::unknown;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::str::FromStr;
 use std::sync::Arc;
 
 /// Every setting of every stage for one task: what a pipeline file holds.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+///
+/// ```
+/// use hilt::config::{ChosenTask, Pipeline, Preset, Source};
+///
+/// let source = Source::BuiltIn(ChosenTask::read("stack")?, Preset::Best);
+/// let pipeline = Pipeline::load(&source, &["train.rho=0.5".into()])?;
+/// assert_eq!((pipeline.task.name.as_str(), pipeline.train.rho), ("stack", 0.5));
+/// assert!(Pipeline::load(&source, &["train.roh=0.5".into()]).is_err());
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Pipeline {
     /// The task: the name of one that comes with hilt, the TOML file of another, or `[task]` itself.
+    #[schemars(with = "String")]
     pub task: ChosenTask,
     /// Who does it: `jaco`, `panda`, `ur5e`, or the TOML file of a robot, relative to the pipeline file.
     #[serde(default)]
+    #[schemars(with = "String")]
     pub robot: ChosenRobot,
     /// Where things stand.
     #[serde(default)]

@@ -2,6 +2,7 @@
 
 use super::limits::refuse;
 use crate::error::{Error, Result};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// Worlds learn in lanes side by side, this many.
@@ -10,7 +11,7 @@ const LANES: usize = 8;
 const MOST_BATCH: usize = 1_000_000;
 
 /// What a step of the simulator earns.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum RewardKind {
     /// The paper's milestones, each paid once an episode: nothing on the way to them.
@@ -20,7 +21,7 @@ pub enum RewardKind {
 }
 
 /// `[train.ppo]`: proximal policy optimisation in the simulator (`hilt train --method ppo`), without demonstrations.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct PpoSettings {
     /// What a step earns.

@@ -5,10 +5,11 @@ use super::limits::{network, within_ranges};
 use super::scene::{FingerPulses, PulseSettings};
 use crate::error::Result;
 use crate::nn::Activation;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// `[pretrain]`: the dynamics network, Algorithm 4.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct PretrainSettings {
     /// Activation of the hidden layers (paper: tanh in Figure 3, rectifier in 4.2).

@@ -2,10 +2,11 @@
 
 use super::choices::{FeatureSet, FingerCloning, Pairs, StateScale};
 use super::scene::PulseSettings;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// `[train.sc]`: L_SC and the rollouts of Algorithm 3, in `hil` and in `sc`.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct ScSettings {
     /// What the policy of method `sc` sees; those of the others see `train.features`. Without the near field it reaches the goal of

@@ -5,11 +5,12 @@ use super::ranges::Range;
 use crate::scene::{Obstacle, Scene};
 use crate::state::Pose;
 use crate::task::Spread;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use toml::Value;
 
 /// `[scene]`: areas that tasks refer to, and what is the same for all objects; used by `plan`, `simulate` and `evaluate`.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct SceneSettings {
     /// Spawn area along x, low and high \[m\]: 30 x 30 cm in front of the arm, within its reach (the paper does not state it).
@@ -100,7 +101,7 @@ pub fn check_scene(scene: &Scene) -> Result<(), String> {
 }
 
 /// `[plan]`: demonstrations as smooth joint trajectories.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct PlanSettings {
     /// Demonstrations to plan. Paper: 200 pick-up, 250 pick-and-place, 300 stack.
@@ -128,7 +129,7 @@ impl Default for PlanSettings {
 }
 
 /// `[simulate.pulses]`: disturbance pulses while recording; the recorded command is the correction.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct PulseSettings {
     /// Probability per step that a pulse begins; 0 turns pulses off.
@@ -147,7 +148,7 @@ impl Default for PulseSettings {
 
 /// `[pretrain.reexecute_fingers]`: for a few control steps each finger is given another command than the demo's, so that the dynamics
 /// network sees hands that open and close where no demo does.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct FingerPulses {
     /// Probability per step that such a pulse begins; 0 turns them off.
@@ -165,7 +166,7 @@ impl Default for FingerPulses {
 }
 
 /// `[simulate]`: execution of plans in contact physics.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct SimulateSettings {
     /// Variance of the Gaussian noise on each of the nine commands, per control step \[(rad/s)^2\] (paper 4.1).

@@ -7,10 +7,11 @@ use super::ppo::PpoSettings;
 use super::sc::ScSettings;
 use crate::error::{Error, Result};
 use crate::nn::Activation;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// `[train]`: the policy, Algorithms 1-3.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct TrainSettings {
     /// Activation of the hidden layers (paper: tanh in Figure 3, rectifier in 4.2).
@@ -37,6 +38,7 @@ pub struct TrainSettings {
     /// tau: error of the mean action, in standard deviations of the demo actions, at which p_t falls to exp(-1/2).
     pub tau: f64,
     /// alpha of Eq. 1: `"adaptive"` (= d_conv) or a number in \[0, 1\].
+    #[schemars(with = "String")]
     pub alpha: Alpha,
     /// Upper bound of an adaptive alpha; 1 = none.
     pub alpha_max: f64,

@@ -13,6 +13,7 @@ mod inspect;
 pub mod json_file;
 mod json_text;
 mod litter;
+pub mod marked;
 pub mod onnx;
 pub mod origin;
 mod parquet_file;

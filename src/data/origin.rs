@@ -50,6 +50,23 @@ pub fn origin(path: &Path, kind: Kind) -> Result<(Provenance, ContentHash)> {
     }
 }
 
+/// The provenance alone, for which little is read.
+///
+/// # Errors
+/// As [`origin`].
+pub fn provenance(path: &Path, kind: Kind) -> Result<Provenance> {
+    match kind {
+        Kind::Table => table_file::Reader::open(path).map(|table| table.provenance().clone()),
+        Kind::Recordings => {
+            let files = recording::files(path)?;
+            let first = files.first().ok_or_else(|| Error::input(path, "holds no recording; run hilt simulate first"))?;
+            recording::read(first).map(|(_, provenance)| provenance)
+        }
+        Kind::Datasets => dataset::provenance(&path.join(dataset::TRAIN)),
+        Kind::Weights(_) | Kind::Summary => origin(path, kind).map(|(provenance, _)| provenance),
+    }
+}
+
 /// The content of these files below a directory.
 fn content_of(root: &Path, files: &[PathBuf]) -> Result<ContentHash> {
     let _waits = interrupt::waiting();

@@ -1,5 +1,6 @@
 //! What a file is that stands where another is to be written: told from its head and its tail, without reading it whole.
 
+use super::marked;
 use super::onnx::{EXPORT, PRODUCER};
 use super::provenance::KEY;
 use super::seal::find_last;
@@ -48,6 +49,8 @@ pub enum Format {
     Gif,
     /// ONNX.
     Onnx,
+    /// A text that hilt wrote for other programs.
+    Marked,
     /// None of these.
     Other,
 }
@@ -97,6 +100,7 @@ pub(super) fn format_of(head: &[u8]) -> Format {
         // Two numbers of the beginning of every ONNX file: its version's field and its producer's.
         [ONNX_VERSION, _, ONNX_PRODUCER, ..] => Format::Onnx,
         _ if head.starts_with(mcap::MAGIC) => Format::Mcap,
+        _ if marked::is_ours(head) => Format::Marked,
         _ => Format::Other,
     }
 }

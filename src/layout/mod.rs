@@ -20,6 +20,16 @@ pub const POSE_DIM: usize = 7;
 pub const POINT_DIM: usize = 3;
 
 /// The layout of the rows of one task, or of one dataset.
+///
+/// ```
+/// use hilt::robot::file::built_in::paper_robot;
+/// use hilt::task::built_in::stack;
+///
+/// let layout = stack().layout(&paper_robot());
+/// assert_eq!((layout.state_dim(), layout.action_dim()), (32, 9));
+/// // Nine joint positions, nine velocities, then where the block is; where the base stands does not change.
+/// assert_eq!((layout.proprioception(), layout.changing()), (18, 25));
+/// ```
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Layout {

@@ -2,10 +2,11 @@
 
 use super::kernel::Finish;
 use super::lanes::Lanes;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// What follows a hidden layer's linear map.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Activation {
     /// Hyperbolic tangent (paper, Figure 3).

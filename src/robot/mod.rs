@@ -7,7 +7,7 @@ pub mod file;
 mod hand;
 pub mod ik;
 pub mod model;
-mod urdf;
+pub mod urdf;
 
 pub use ik::{Ik, Unreachable};
 pub use model::Robot;

@@ -9,6 +9,16 @@ const UNIT: f64 = 1e-6;
 
 /// A robot whose foot stands at the world's origin. Link 0 is the foot; link i + 1 hangs on joint i and moves with it. The arm's joints
 /// come first, one behind the other, then those of the fingers; the last link of the arm is the hand.
+///
+/// ```
+/// use hilt::robot::file::built_in::named;
+///
+/// let panda = named("panda").expect("it comes with hilt")?;
+/// assert_eq!((panda.arm, panda.fingers().len()), (7, 2));
+/// let tool = panda.tool_pose(&panda.ready);
+/// assert!(tool.translation.z > 0.2, "the hand waits above the table");
+/// # Ok::<(), String>(())
+/// ```
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Robot {
     /// Short name.

@@ -23,6 +23,15 @@ pub const GRASP_OVER_CENTER_M: f64 = -0.001;
 const LOWEST_GRASP_M: f64 = 0.024;
 
 /// A task: `[task]` of a pipeline file.
+///
+/// ```
+/// use hilt::task::built_in;
+///
+/// let sort = built_in::find("sort")?;
+/// assert_eq!((sort.objects.len(), sort.moved()), (2, 2));
+/// assert!(built_in::find("srot").unwrap_err().contains("did you mean sort?"));
+/// # Ok::<(), String>(())
+/// ```
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "TaskFile", into = "TaskFile")]
 pub struct Task {

@@ -1,11 +1,12 @@
 //! Numbers that may be drawn anew for every episode.
 
 use rand::{Rng, RngExt};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::fmt;
 
 /// A number of the scene: fixed, or drawn anew for every episode.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(untagged, expecting = "expected a number, or a range to draw from: [low, high]")]
 pub enum Spread {
     /// The same in every episode.

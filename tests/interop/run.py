@@ -43,7 +43,9 @@ def recording(path, task):
     counts, steps, outcome, links = {}, [], None, set()
     with path.open("rb") as stream:
         reader = make_reader(stream, validate_crcs=True, decoder_factories=[DecoderFactory()])
-        for _, channel, message, decoded in reader.iter_decoded_messages():
+        # The description is of ROS 2: viewers.py reads it.
+        topics = [channel.topic for channel in reader.get_summary().channels.values() if channel.message_encoding == "protobuf"]
+        for _, channel, message, decoded in reader.iter_decoded_messages(topics=topics):
             counts[channel.topic] = counts.get(channel.topic, 0) + 1
             if channel.topic == "/hilt/step":
                 check(message.log_time == decoded.step * 10**9 // FPS, f"{path}: time of step {decoded.step}")

@@ -8,6 +8,7 @@ here=$(cd "$(dirname "$0")" && pwd)
 home=$here/../../target/interop
 "$here/../../python/venv.sh" "$home" "$here/requirements.txt" 3.12 3.12
 HF_HUB_OFFLINE=1 HF_HOME="$home/huggingface" "$home/venv/bin/python" "$here/run.py" "$1"
+"$home/venv/bin/python" "$here/viewers.py" "$1"/*/recordings/episode-00000.mcap
 "$home/venv/bin/python" "$here/policies.py" "$1" "$2"
 "$home/venv/bin/python" "$here/wire.py" "$2" "$1"
 HF_HUB_OFFLINE=1 HF_HOME="$home/huggingface" exec "$home/venv/bin/python" "$here/foreign.py" "$2" "$here/../../fixtures/foreign" "$1/pick-up/dataset/train"

@@ -6,6 +6,7 @@ use serde_json::json;
 
 /// Write a dataset anew as LeRobot writes it: float32 for float64, exact timestamps, plain files, all statistics.
 #[derive(Debug, clap::Args)]
+#[command(after_help = "Example:\n  hilt dataset convert dataset/train --out plain")]
 pub struct Args {
     #[command(flatten)]
     ends: Ends,

@@ -7,6 +7,7 @@ use serde_json::json;
 
 /// Leave out columns or episodes of a dataset.
 #[derive(Debug, clap::Args)]
+#[command(after_help = "Example:\n  hilt dataset drop dataset/train --episodes 0,2 --out fewer")]
 pub struct Args {
     #[command(flatten)]
     ends: Ends,

@@ -6,6 +6,7 @@ use serde_json::json;
 
 /// Keep some episodes of a dataset: those that meet all of the conditions.
 #[derive(Debug, clap::Args)]
+#[command(after_help = "Example:\n  hilt dataset filter dataset/train --success --min-length 50 --out short")]
 pub struct Args {
     #[command(flatten)]
     ends: Ends,

@@ -9,6 +9,7 @@ use std::path::PathBuf;
 
 /// Say what a dataset is: episodes, frames, rate, columns, tasks, size. It reads the description, not the frames.
 #[derive(Debug, clap::Args)]
+#[command(after_help = "Example:\n  hilt dataset info dataset")]
 pub struct Args {
     /// A LeRobotDataset v3.0, or a directory with train and validation
     #[arg(value_name = "DIR")]

@@ -7,6 +7,7 @@ use std::path::PathBuf;
 
 /// Put the episodes of several datasets with the same columns into one, renumbered.
 #[derive(Debug, clap::Args)]
+#[command(after_help = "Example:\n  hilt dataset merge dataset/train dataset/validation --out all")]
 pub struct Args {
     /// LeRobotDatasets v3.0, two or more
     #[arg(value_name = "DIR", required = true, num_args = 2..)]

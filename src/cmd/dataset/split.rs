@@ -9,6 +9,7 @@ use std::path::PathBuf;
 
 /// Split a dataset by episode into the datasets train and validation, each with its own statistics.
 #[derive(Debug, clap::Args)]
+#[command(after_help = "Example:\n  hilt dataset split dataset/train --ratio 5 --out parts")]
 pub struct Args {
     /// A LeRobotDataset v3.0
     #[arg(value_name = "DIR")]

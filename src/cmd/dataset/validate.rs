@@ -7,6 +7,7 @@ use std::path::PathBuf;
 
 /// Name everything that is wrong with a dataset: what LeRobot needs to load it, and what learning needs beyond. Exit code 1 if there is anything.
 #[derive(Debug, clap::Args)]
+#[command(after_help = "Example:\n  hilt dataset validate dataset/train")]
 pub struct Args {
     /// A LeRobotDataset v3.0, or a directory with train and validation
     #[arg(value_name = "DIR")]

@@ -1,33 +1,17 @@
 //! What a viewer shows: transforms, joint states and the things of the scene.
 
+use super::surroundings::{Thing, WORLD_FRAME, frame_of, things};
 use crate::demo::Step;
 use crate::robot::Robot;
+use crate::robot::urdf::{Geometry, Solid};
 use crate::scene::Scene;
 use crate::state::{Pose, State};
-use crate::task::Shape;
 use foxglove::messages::{
     self as msg, Color, CubePrimitive, CylinderPrimitive, FrameTransform, FrameTransforms, JointState, JointStates, Quaternion,
     SceneEntity, SceneUpdate, SpherePrimitive, Timestamp, Vector3,
 };
 use nalgebra::Isometry3;
 
-/// The fixed frame: the robot's foot, z up.
-pub const WORLD_FRAME: &str = "world";
-/// The frame of an object of the task: no link of a robot is called so.
-pub fn frame_of(object: &str) -> String {
-    format!("object/{object}")
-}
-
-/// Drawn table: edge lengths \[m\]; it reaches past everything the arm can touch.
-const TABLE_SIZE_M: [f64; 3] = [2.0, 2.0, 0.04];
-/// Drawn goal: diameter of the ball \[m\].
-const GOAL_DIAMETER_M: f64 = 0.02;
-const GREY: [f64; 4] = [0.75, 0.75, 0.72, 1.0];
-/// Objects that goals move: red, yellow, violet.
-const MOVED: [[f64; 4]; 3] = [[0.80, 0.22, 0.18, 1.0], [0.88, 0.66, 0.16, 1.0], [0.55, 0.33, 0.68, 1.0]];
-const BLUE: [f64; 4] = [0.20, 0.40, 0.75, 1.0];
-const GREEN: [f64; 4] = [0.20, 0.65, 0.30, 0.8];
-const DARK: [f64; 4] = [0.30, 0.30, 0.34, 1.0];
 const NANOSECONDS_PER_SECOND: u64 = 1_000_000_000;
 
 /// `/tf`: every link below its URDF parent (the base link below the world), and the objects.
@@ -60,35 +44,28 @@ pub(super) fn joints(robot: &Robot, state: &State, time_ns: u64) -> JointStates 
 
 /// `/scene`: things that keep their shape; those that move are locked to their frame.
 pub(super) fn drawing(scene: &Scene) -> SceneUpdate {
-    let table = cube([0.0, 0.0, -TABLE_SIZE_M[2] / 2.0], TABLE_SIZE_M, GREY);
-    let mut entities = vec![SceneEntity { cubes: vec![table], ..entity("table", WORLD_FRAME) }];
-    for (i, object) in scene.task.objects.iter().enumerate() {
-        let rgba = if i < scene.task.moved() { MOVED[i % MOVED.len()] } else { BLUE };
-        let mut drawn = entity(&object.name, &frame_of(&object.name));
-        if let Shape::Cylinder { radius_m, height_m } = object.shape {
-            drawn.cylinders.push(CylinderPrimitive {
-                pose: Some(pose(&at([0.0; 3]))),
+    SceneUpdate { deletions: Vec::new(), entities: things(scene).iter().map(drawn).collect() }
+}
+
+fn drawn(Thing { name, frame, solids }: &Thing) -> SceneEntity {
+    let mut drawn = entity(name, frame);
+    for Solid { at_m, geometry, rgba } in solids {
+        let (pose, color) = (Some(pose(&Pose::from_yaw(*at_m, 0.0))), Some(color(*rgba)));
+        match *geometry {
+            Geometry::Box(size_m) => drawn.cubes.push(CubePrimitive { pose, size: Some(vector(size_m)), color }),
+            Geometry::Cylinder { radius_m, height_m } => drawn.cylinders.push(CylinderPrimitive {
+                pose,
                 size: Some(vector([2.0 * radius_m, 2.0 * radius_m, height_m])),
                 bottom_scale: 1.0,
                 top_scale: 1.0,
-                color: Some(color(rgba)),
-            });
-        } else {
-            let boxes = object.shape.boxes_m().into_iter();
-            drawn.cubes = boxes.map(|(center, half)| cube(center, half.map(|h| 2.0 * h), rgba)).collect();
+                color,
+            }),
+            Geometry::Ball(radius_m) => {
+                drawn.spheres.push(SpherePrimitive { pose, size: Some(vector([2.0 * radius_m; 3])), color });
+            }
         }
-        entities.push(drawn);
     }
-    for (name, goal) in scene.task.goal_names().iter().zip(&scene.goals) {
-        let ball =
-            SpherePrimitive { pose: Some(pose(&at(*goal))), size: Some(vector([GOAL_DIAMETER_M; 3])), color: Some(color(GREEN)) };
-        entities.push(SceneEntity { spheres: vec![ball], ..entity(name, WORLD_FRAME) });
-    }
-    if !scene.obstacles.is_empty() {
-        let cubes = scene.obstacles.iter().map(|o| cube(o.center_m, o.size_m, DARK)).collect();
-        entities.push(SceneEntity { cubes, ..entity("obstacles", WORLD_FRAME) });
-    }
-    SceneUpdate { deletions: Vec::new(), entities }
+    drawn
 }
 
 /// An empty entity that stays until the end.
@@ -100,14 +77,6 @@ fn entity(id: &str, frame: &str) -> SceneEntity {
         frame_locked: true,
         ..SceneEntity::default()
     }
-}
-
-fn cube(center_m: [f64; 3], size_m: [f64; 3], rgba: [f64; 4]) -> CubePrimitive {
-    CubePrimitive { pose: Some(pose(&at(center_m))), size: Some(vector(size_m)), color: Some(color(rgba)) }
-}
-
-fn at(position_m: [f64; 3]) -> Pose {
-    Pose::from_yaw(position_m, 0.0)
 }
 
 fn transform(parent: &str, child: &str, parent_from_child: &Isometry3<f64>, time_ns: u64) -> FrameTransform {

@@ -5,50 +5,46 @@
 //! | `/tf` | foxglove.FrameTransforms | robot links by forward kinematics, objects |
 //! | `/joint_states` | foxglove.JointStates | angle \[rad\] and velocity \[rad/s\] by URDF joint name |
 //! | `/scene` | foxglove.SceneUpdate | table, objects, goals, obstacles: once, attached to their frames |
+//! | `/robot_description` | std_msgs/msg/String | robot and surroundings as a URDF whose links are those frames: once |
 //! | `/hilt/scene` | hilt.Scene | what stood where at the start: once |
 //! | `/hilt/step` | hilt.Step | every control step, then the final state |
 //! | `/hilt/outcome` | hilt.Outcome | success or failure class: once, at the end |
 //!
-//! The robot is attached twice: as `robot.urdf` for viewers, as `robot.json` with all that hilt knows of it; the task as `task.json`; the metadata record `hilt` holds provenance and seal. Times are simulated, from 0. MCAP's own
+//! The robot is attached twice: as `robot.urdf` for other programs, as `robot.json` with all that hilt knows of it; the task as `task.json`; the metadata record `hilt` holds provenance and seal. Times are simulated, from 0. MCAP's own
 //! checksums hold as well: the one of the data section is computed last and covers the seal, which takes its place for zeros.
 
 mod decode;
 mod encode;
 mod fields;
 mod foxglove;
+mod messages;
 mod moment;
 mod older;
 mod records;
+mod surroundings;
 mod topics;
 mod walk;
 
-pub use foxglove::{WORLD_FRAME, frame_of};
+pub use surroundings::{WORLD_FRAME, frame_of, scene_urdf};
 
 use super::bytes::{Ends, Format};
-use super::{ContentHash, Provenance, atomic, proto, provenance, seal};
+use super::{ContentHash, Provenance, atomic, provenance, seal};
 use crate::demo::Episode;
 use crate::error::{Error, Result};
 use crate::guard::guarded;
 use crate::interrupt;
 use crate::robot::urdf;
-use crate::state::CONTROL_HZ;
-use ::foxglove::Encode;
-use ::foxglove::messages::{FrameTransforms, JointStates, SceneUpdate};
 use fields::Fields;
-use mcap::records::{MessageHeader, Metadata};
-use mcap::{Attachment, McapResult, WriteOptions, Writer};
-use prost::Message;
+use mcap::records::Metadata;
+use mcap::{Attachment, McapResult, WriteOptions};
 use records::{Sections, op};
 use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::io::Cursor;
 use std::path::{Path, PathBuf};
-use topics::{OUTCOME_TOPIC, SCENE_TOPIC, STEP_TOPIC};
-pub use topics::{ROBOT_NAME, TASK_NAME, URDF_NAME};
+pub use topics::{DESCRIPTION_TOPIC, ROBOT_NAME, TASK_NAME, URDF_NAME};
 use walk::Outline;
 
-/// Duration of a control step on the clock of the file \[ns\].
-const STEP_NS: u64 = 1_000_000_000 / CONTROL_HZ as u64;
 /// Key of the provenance in the metadata record.
 const PROVENANCE: &str = "provenance";
 /// Key of the seal in the metadata record.
@@ -211,7 +207,7 @@ fn to_mcap(episode: &Episode, provenance: &Provenance) -> McapResult<Vec<u8>> {
         .calculate_data_section_crc(false)
         .library(concat!("hilt ", env!("CARGO_PKG_VERSION")));
     let mut writer = options.create(Cursor::new(Vec::new()))?;
-    write_messages(&mut writer, episode)?;
+    messages::write(&mut writer, episode)?;
     let robot = &*episode.scene.robot;
     let json = serde_json::to_vec(robot).expect("a robot is plain data with text keys");
     let task = serde_json::to_vec(&*episode.scene.task).expect("a task is plain data with text keys");
@@ -228,48 +224,4 @@ fn to_mcap(episode: &Episode, provenance: &Provenance) -> McapResult<Vec<u8>> {
     writer.write_metadata(&Metadata { name: provenance::KEY.into(), metadata: BTreeMap::from(entries) })?;
     writer.finish()?;
     Ok(writer.into_inner().into_inner())
-}
-
-fn write_messages(writer: &mut Writer<Cursor<Vec<u8>>>, episode: &Episode) -> McapResult<()> {
-    let mut frames = foxglove_channel::<FrameTransforms>(writer, "/tf")?;
-    let mut joints = foxglove_channel::<JointStates>(writer, "/joint_states")?;
-    let mut drawing = foxglove_channel::<SceneUpdate>(writer, "/scene")?;
-    let mut scene = channel(writer, SCENE_TOPIC, "hilt.Scene", "protobuf", proto::DESCRIPTORS)?;
-    let mut steps = channel(writer, STEP_TOPIC, "hilt.Step", "protobuf", proto::DESCRIPTORS)?;
-    let mut outcome = channel(writer, OUTCOME_TOPIC, "hilt.Outcome", "protobuf", proto::DESCRIPTORS)?;
-    let robot = &*episode.scene.robot;
-    scene.write(writer, 0, &encode::scene(&episode.scene))?;
-    drawing.write(writer, 0, &foxglove::drawing(&episode.scene))?;
-    let (end, conditions) = (episode.steps.len(), episode.scene.task.condition_names());
-    for (t, step) in episode.steps.iter().chain([&episode.last]).enumerate() {
-        let time = t as u64 * STEP_NS;
-        frames.write(writer, time, &foxglove::frames(&episode.scene, step, time))?;
-        joints.write(writer, time, &foxglove::joints(robot, &step.state, time))?;
-        steps.write(writer, time, &encode::step(step, &conditions, t, t == end))?;
-    }
-    outcome.write(writer, end as u64 * STEP_NS, &encode::outcome(episode))
-}
-
-/// A topic and the number of its next message.
-struct Topic {
-    id: u16,
-    sequence: u32,
-}
-
-impl Topic {
-    fn write(&mut self, writer: &mut Writer<Cursor<Vec<u8>>>, time_ns: u64, message: &impl Message) -> McapResult<()> {
-        let header = MessageHeader { channel_id: self.id, sequence: self.sequence, log_time: time_ns, publish_time: time_ns };
-        self.sequence += 1;
-        writer.write_to_known_channel(&header, &message.encode_to_vec())
-    }
-}
-
-fn channel(writer: &mut Writer<Cursor<Vec<u8>>>, topic: &str, name: &str, encoding: &str, schema: &[u8]) -> McapResult<Topic> {
-    let schema = writer.add_schema(name, encoding, schema)?;
-    Ok(Topic { id: writer.add_channel(schema, topic, "protobuf", &BTreeMap::new())?, sequence: 0 })
-}
-
-fn foxglove_channel<M: Encode>(writer: &mut Writer<Cursor<Vec<u8>>>, topic: &str) -> McapResult<Topic> {
-    let schema = M::get_schema().expect("Foxglove's own messages have schemas");
-    channel(writer, topic, &schema.name, &schema.encoding, &schema.data)
 }

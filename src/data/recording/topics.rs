@@ -12,3 +12,5 @@ pub const URDF_NAME: &str = "robot.urdf";
 pub const ROBOT_NAME: &str = "robot.json";
 /// Name of the attached task.
 pub const TASK_NAME: &str = "task.json";
+/// Robot and surroundings as a URDF, on the topic on which viewers look for it.
+pub const DESCRIPTION_TOPIC: &str = "/robot_description";

@@ -23,6 +23,19 @@ const HORIZON_OVER_P95: usize = 2;
 const MOST_HORIZON_STEPS: u32 = HORIZON_OVER_P95 as u32 * MOST_STEPS;
 
 /// pi_theta with everything needed to run it.
+///
+/// ```
+/// use hilt::data::weights::{POLICY, read};
+/// use hilt::learn::Policy;
+/// use hilt::tasks::with_layout;
+///
+/// let (tensors, description, made) = read("fixtures/pick-up/policy.safetensors".as_ref(), POLICY)?;
+/// let policy = Policy::from_tensors(&tensors, &with_layout(description))?;
+/// assert_eq!((made.task.as_str(), policy.layout().state_dim()), ("pick-up", 25));
+/// let velocities = policy.act(&[0.1; 25]);
+/// assert_eq!(velocities.len(), 9);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct Policy {
     horizon_steps: u32,
