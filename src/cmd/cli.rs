@@ -3,7 +3,7 @@
 use super::console::Console;
 use super::context::{Context, Outcome};
 use super::{
-    convert, dataset, evaluate, experiment, export, inspect, plan, pretrain, render, report, robot, serve, serve_env, settings,
+    compare, convert, dataset, evaluate, experiment, export, inspect, plan, pretrain, render, report, robot, runs, serve, serve_env, settings,
     simulate, train,
 };
 use crate::error::{Error, Result};
@@ -51,6 +51,8 @@ enum Command {
     Train(train::Args),
     Evaluate(evaluate::Args),
     Inspect(inspect::Args),
+    Runs(runs::Args),
+    Compare(compare::Args),
     Dataset(dataset::Args),
     Render(render::Args),
     Settings(settings::Args),
@@ -91,6 +93,8 @@ impl Cli {
             Command::Serve(args) => serve::run(args, &context),
             Command::ServeEnv(args) => serve_env::run(args, &context),
             Command::Inspect(args) => return inspect::run(args, &context),
+            Command::Runs(args) => return runs::run(args, &context),
+            Command::Compare(args) => return compare::run(args, &context),
             Command::Render(args) => render::run(args, &context),
             Command::Robot(args) => return robot::run(args, &context),
             Command::Settings(args) => return settings::run(args, &context),

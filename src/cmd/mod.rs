@@ -3,6 +3,7 @@
 mod checkpoint;
 mod cli;
 mod common;
+mod compare;
 mod console;
 mod context;
 mod convert;
@@ -22,6 +23,7 @@ mod pretrain;
 mod render;
 mod report;
 mod robot;
+mod runs;
 mod serve;
 mod serve_env;
 mod settings;

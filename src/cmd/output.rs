@@ -7,6 +7,17 @@ use serde::Serialize;
 use std::io::{ErrorKind, Write, stdout};
 use std::path::Path;
 
+/// Characters of a line on the terminal that stdout is; `None` where it is none: a file or a pipe takes lines of any length.
+pub fn width() -> Option<usize> {
+    size().map(|[width, _]| width)
+}
+
+/// The same with its lines.
+pub fn size() -> Option<[usize; 2]> {
+    let (width, height) = terminal_size::terminal_size_of(stdout())?;
+    Some([width.0.into(), height.0.into()])
+}
+
 /// Prints text. A reader that has seen enough (`| head`) is no error.
 ///
 /// # Errors
