@@ -3,7 +3,7 @@
 use assert_cmd::Command;
 use std::fs;
 
-const STAGES: [&str; 12] = [
+const STAGES: [&str; 15] = [
     "plan",
     "simulate",
     "convert",
@@ -11,6 +11,9 @@ const STAGES: [&str; 12] = [
     "train",
     "evaluate",
     "inspect",
+    "runs",
+    "compare",
+    "plot",
     "render",
     "settings",
     "export",

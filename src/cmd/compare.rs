@@ -36,13 +36,19 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome> {
         None if ours.len() == 2 => vec![ours.remove(1)],
         None => {
             let (n, path) = (ours.len(), first.display());
-            return Err(Error::Usage(format!("{path}: has {n} evaluations; name the one to compare with, or a run that has two")));
+            return Err(Error::Usage(format!(
+                "{path}: has {n} evaluations; name the one to compare with, or a run that has two"
+            )));
         }
     };
     let width = output::width();
     if let ([one], [other]) = (ours.as_slice(), theirs.as_slice()) {
         let found = compare(one, other);
-        if args.json { output::print_json(&found.to_json())? } else { output::print(&found.to_text(width))? }
+        if args.json {
+            output::print_json(&found.to_json())?
+        } else {
+            output::print(&found.to_text(width))?
+        }
         return Ok(Outcome::Done);
     }
     let found = by_seeds(&ours, &theirs).map_err(|why| Error::input(&first, why))?;

@@ -24,7 +24,11 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome> {
     Places::new().read(&args.path).check(&context.console)?;
     if is_run(&args.path) {
         let run = Run::read(&args.path, &context.interrupt)?;
-        if args.json { output::print_json(&run.to_json())? } else { output::print(&run.to_text(output::width()))? }
+        if args.json {
+            output::print_json(&run.to_json())?
+        } else {
+            output::print(&run.to_text(output::width()))?
+        }
         return Ok(Outcome::Done);
     }
     let found = data::inspect(&args.path, &context.interrupt)?;

@@ -127,4 +127,49 @@ mod tests {
         close(low, -0.507, 5e-4);
         close(high, -0.026, 5e-4);
     }
+
+    #[test]
+    fn the_test_and_the_interval_of_pairs_are_those_of_statsmodels() {
+        // pip install statsmodels==0.15.0; the interval by Newcombe's formula over its Wilson intervals, for it has none of its own:
+        // mcnemar([[a, b], [c, d]], exact=True).pvalue; proportion_confint(k, n, method="wilson").
+        let known: [([u64; 4], f64, [f64; 2]); 5] = [
+            ([36, 12, 2, 0], 0.012_939_453_125, [0.056_929_584_003_2, 0.340_427_602_974_9]),
+            ([20, 12, 2, 16], 0.012_939_453_125, [0.056_156_424_841_7, 0.329_206_995_400_1]),
+            ([54, 0, 0, 0], 1.0, [-0.066_413_588_090_9, 0.066_413_588_090_9]),
+            ([53, 1, 0, 0], 1.0, [-0.049_621_661_889_4, 0.097_714_374_887_8]),
+            // HIL and behavior cloning on stack with 10 demos: docs/runs.md.
+            ([424, 48, 16, 12], 7.733_076_881_287e-5, [0.033_092_040_565_7, 0.096_294_027_746_0]),
+        ];
+        for (counts, p, [low, high]) in known {
+            let found = pairs(counts);
+            close(found.mcnemar_exact() / p, 1.0, 1e-9);
+            close(found.newcombe_95()[0], low, 1e-12);
+            close(found.newcombe_95()[1], high, 1e-12);
+        }
+    }
+
+    #[test]
+    fn the_interval_of_independent_rates_is_that_of_statsmodels() {
+        // confint_proportions_2indep(56, 70, 48, 80, method="newcomb", compare="diff"): also Newcombe's own table II, 0.0524 to 0.3339.
+        for (first, second, [low, high]) in [
+            ((56, 70), (48, 80), [0.052_431_472_402_4, 0.333_872_653_636_9]),
+            ((9, 10), (3, 10), [0.170_522_723_934_5, 0.809_017_973_535_5]),
+        ] {
+            let found = newcombe_95(first, second);
+            close(found[0], low, 1e-12);
+            close(found[1], high, 1e-12);
+        }
+    }
+
+    #[test]
+    fn the_ends_are_no_special_cases() {
+        assert_eq!(pairs([0, 0, 0, 0]).mcnemar_exact(), 1.0);
+        assert!(newcombe_95((0, 0), (0, 0)).iter().all(|end| end.is_finite()));
+        // Thousands of episodes, of which 2^-n is no number: half of the test's p is the probability of at most 900 heads of 2,000.
+        close(pairs([50_000, 900, 1_100, 0]).mcnemar_exact() / 8.457_089_535_503_8e-6, 1.0, 1e-9);
+        let (here, there) = (pairs([7, 5, 1, 2]), pairs([7, 1, 5, 2]));
+        assert_eq!(here.mcnemar_exact(), there.mcnemar_exact());
+        close(here.newcombe_95()[0], -there.newcombe_95()[1], 1e-15);
+        assert_eq!(Pairs::of([(true, false), (false, true), (true, true), (true, false)].into_iter()), pairs([1, 2, 1, 0]));
+    }
 }

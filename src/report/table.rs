@@ -59,7 +59,8 @@ pub fn wrapped(words: &str, width: Option<usize>) -> String {
     let indent = words.len() - words.trim_start().len();
     let (first, rest) = (" ".repeat(indent), " ".repeat(indent + GAP));
     let options = textwrap::Options::new(width.max(rest.len() + 1)).initial_indent(&first).subsequent_indent(&rest);
-    let options = options.word_separator(textwrap::WordSeparator::AsciiSpace).word_splitter(textwrap::WordSplitter::NoHyphenation);
+    let options =
+        options.word_separator(textwrap::WordSeparator::AsciiSpace).word_splitter(textwrap::WordSplitter::NoHyphenation);
     format!("{}\n", textwrap::fill(words.trim_start(), options))
 }
 
@@ -92,14 +93,18 @@ mod tests {
         let header = ["run", "success", "demos", "settings"];
         assert_eq!(fitted_table(&header, &rows, Some(80)), text_table(&header, &rows));
         assert_eq!(fitted_table(&header, &rows, None), text_table(&header, &rows));
-        let told = "runs/stack\n  success 94.4 %, demos 10\nruns/tower\n  success 8.5 %, demos 300,\n    settings train.rho=0.3\n";
+        let told =
+            "runs/stack\n  success 94.4 %, demos 10\nruns/tower\n  success 8.5 %, demos 300,\n    settings train.rho=0.3\n";
         assert_eq!(fitted_table(&header, &rows, Some(30)), told);
     }
 
     #[test]
     fn words_are_wrapped_with_their_indent_and_none_is_lost() {
         assert_eq!(wrapped("  one two three", Some(9)), "  one two\n    three\n");
-        assert_eq!(wrapped("a-long-word-that-fits-nowhere b", Some(5)).split_whitespace().collect::<String>(), "a-long-word-that-fits-nowhereb");
+        assert_eq!(
+            wrapped("a-long-word-that-fits-nowhere b", Some(5)).split_whitespace().collect::<String>(),
+            "a-long-word-that-fits-nowhereb"
+        );
         assert_eq!(wrapped("one two", None), "one two\n");
     }
 

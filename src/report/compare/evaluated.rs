@@ -73,7 +73,9 @@ fn of_run(dir: &Path, interrupt: &Interrupt) -> Result<Vec<Evaluated>> {
     let trained = |judged: &Judged| {
         let policies = run.stages.iter().filter(|standing| standing.stage == Stage::Train).filter_map(|s| s.origin.as_ref());
         let own = policies.map(|(made, content)| (made, content.to_string()));
-        own.into_iter().find(|(_, content)| judged.made.inputs.get("policy") == Some(content)).map(|(made, _)| made.settings.clone())
+        own.into_iter()
+            .find(|(_, content)| judged.made.inputs.get("policy") == Some(content))
+            .map(|(made, _)| made.settings.clone())
     };
     let read = |judged: &Judged| {
         let name = format!("{} ({})", judged.path.display(), judged.method);
@@ -92,7 +94,9 @@ impl Evaluated {
         let evaluated = Evaluated { name, method, path: path.to_path_buf(), made, trained, episodes };
         if evaluated.made.stage != Stage::Evaluate.name() || evaluated.columns().is_none() {
             let stage = &evaluated.made.stage;
-            let message = format!("is a table of hilt {stage}, not the episodes of an evaluation; expected evaluation.json or evaluation.{EPISODES}");
+            let message = format!(
+                "is a table of hilt {stage}, not the episodes of an evaluation; expected evaluation.json or evaluation.{EPISODES}"
+            );
             return Err(Error::input(path, message));
         }
         Ok(evaluated)
@@ -110,7 +114,8 @@ impl Evaluated {
     /// Numbers of the episodes, whether each was solved, why not, and its steps.
     pub(super) fn outcomes(&self) -> Vec<Outcome<'_>> {
         let Some((episode, success, failure, steps)) = self.columns() else { return Vec::new() };
-        let outcome = |row: usize| Outcome { row, episode: episode[row], success: success[row], failure: &failure[row], steps: steps[row] };
+        let outcome =
+            |row: usize| Outcome { row, episode: episode[row], success: success[row], failure: &failure[row], steps: steps[row] };
         (0..episode.len()).map(outcome).collect()
     }
 

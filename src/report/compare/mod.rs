@@ -6,5 +6,5 @@ mod seeds;
 mod words;
 
 pub use evaluated::{Evaluated, find};
-pub use pairing::{Comparison, Change, compare};
+pub use pairing::{Change, Comparison, compare};
 pub use seeds::{BySeeds, by_seeds};

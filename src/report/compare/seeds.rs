@@ -25,7 +25,8 @@ pub fn by_seeds(first: &[Evaluated], second: &[Evaluated]) -> Result<BySeeds, St
     let tasks: Vec<String> = tasks(first).intersection(&tasks(second)).cloned().collect();
     let scores = [strata(first, &tasks)?, strata(second, &tasks)?];
     let comparison = Comparison::of(&scores[0], &scores[1]);
-    let comparison = comparison.ok_or("they have no seed of the same task in common, so there is nothing to pair; name single evaluations")?;
+    let comparison =
+        comparison.ok_or("they have no seed of the same task in common, so there is nothing to pair; name single evaluations")?;
     Ok(BySeeds { tasks, scores, comparison })
 }
 
@@ -39,7 +40,9 @@ fn scores(of: &[Evaluated], task: &str) -> Result<Vec<Score>, String> {
         let ((solved, all), seed) = (evaluated.counts(), evaluated.made.seed);
         if let Some((_, other)) = scores.iter().find(|(score, _)| score.seed == seed) {
             let (a, b) = (&other.name, &evaluated.name);
-            return Err(format!("{a} and {b} are both of {task}, seed {seed}; name one method (DIR:hil) or a directory with one evaluation a seed"));
+            return Err(format!(
+                "{a} and {b} are both of {task}, seed {seed}; name one method (DIR:hil) or a directory with one evaluation a seed"
+            ));
         }
         scores.push((Score { seed, value: solved as f64 / all.max(1) as f64 }, evaluated));
     }
@@ -68,7 +71,8 @@ impl BySeeds {
         let estimate = |e: Estimate| json!({ "value": e.value, "interval_95": e.interval });
         let scores = |strata: &Strata| {
             let of = |(task, scores): (&String, &Vec<Score>)| {
-                let scores: Vec<Value> = scores.iter().map(|score| json!({ "seed": score.seed, "success_rate": score.value })).collect();
+                let scores: Vec<Value> =
+                    scores.iter().map(|score| json!({ "seed": score.seed, "success_rate": score.value })).collect();
                 (task.clone(), Value::Array(scores))
             };
             Value::Object(self.tasks.iter().zip(strata).map(of).collect())
@@ -83,5 +87,24 @@ impl BySeeds {
             "probability_of_improvement": estimate(self.comparison.improvement),
             "verdict": self.verdict(),
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::pairing::tests::evaluated;
+    use super::*;
+
+    #[test]
+    fn seeds_that_both_have_are_pairs_and_two_of_one_seed_are_refused() {
+        let group = |ends: [&[&str]; 4]| (0..).zip(ends).map(|(seed, ends)| evaluated("a", seed, 0, ends)).collect::<Vec<_>>();
+        let (good, bad): (&[&str], &[&str]) = (&["", "", "", "x"], &["x", "x", "", "x"]);
+        let (a, b) = (group([good; 4]), group([bad; 4]));
+        let found = by_seeds(&a, &b).expect("pairs");
+        assert_eq!((found.comparison.pairs, found.comparison.difference.value, found.verdict()), (4, 0.5, "the first is better"));
+        assert!(by_seeds(&a[..2], &b).expect("pairs").verdict().contains("fewer than three seeds"));
+        let twice = [&a[..], &b[..1]].concat();
+        assert!(by_seeds(&twice, &b).expect_err("refused").contains("are both of lift, seed 0"));
+        assert!(by_seeds(&a[..1], &b[1..]).expect_err("refused").contains("no seed of the same task in common"));
     }
 }

@@ -29,13 +29,20 @@ impl Comparison<'_> {
                 text += &wrapped(&format!("not paired: {why}"), width);
                 let answer = if low.signum() == high.signum() { better(self.difference) } else { "they cannot be told apart" };
                 text += &wrapped(
-                    &format!("A - B: {difference:+.1} points, 95 % interval {low:+.1} to {high:+.1} (Newcombe, independent rates): {answer}"),
+                    &format!(
+                        "A - B: {difference:+.1} points, 95 % interval {low:+.1} to {high:+.1} (Newcombe, independent rates): {answer}"
+                    ),
                     width,
                 );
             }
             None => {
                 text += &wrapped(
-                    &format!("paired: {} episodes with the same starts, task {}, seed {}", self.pairs.all(), first.made.task, first.made.seed),
+                    &format!(
+                        "paired: {} episodes with the same starts, task {}, seed {}",
+                        self.pairs.all(),
+                        first.made.task,
+                        first.made.seed
+                    ),
                     width,
                 );
                 let p = self.mcnemar.unwrap_or(1.0);
@@ -80,7 +87,9 @@ impl Comparison<'_> {
 
     /// Failures, conditions and lengths.
     fn ends(&self) -> String {
-        let row = |name: String, [a, b]: [u64; 2]| vec![name, a.to_string(), b.to_string(), format!("{:+}", a.cast_signed() - b.cast_signed())];
+        let row = |name: String, [a, b]: [u64; 2]| {
+            vec![name, a.to_string(), b.to_string(), format!("{:+}", a.cast_signed() - b.cast_signed())]
+        };
         let mut rows: Vec<Vec<String>> = self.failures.iter().map(|(class, n)| row(format!("failed: {class}"), *n)).collect();
         rows.extend(self.conditions.iter().map(|(name, n)| row(format!("at the end: {name}"), *n)));
         let of = if self.apart.is_none() { "steps where both solved, median" } else { "steps where solved, median" };

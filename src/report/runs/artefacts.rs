@@ -34,14 +34,18 @@ pub fn artefacts(dir: &Path) -> Result<Vec<Artefact>> {
     let entries = fs::read_dir(dir).map_err(|e| Error::io(dir, "read", e))?;
     let paths = entries.map(|entry| entry.map(|e| e.path())).collect::<std::io::Result<Vec<_>>>();
     let mut found: Vec<Artefact> = paths.map_err(|e| Error::io(dir, "read", e))?.into_iter().filter_map(artefact).collect();
-    found.sort_by(|a, b| (a.stage as usize, &a.path).cmp(&(b.stage as usize, &b.path)));
+    // policy.safetensors before policy-bc.safetensors.
+    let place = |artefact: &Artefact| (artefact.stage as usize, artefact.path.file_stem().map(|stem| stem.to_os_string()));
+    found.sort_by_key(place);
     Ok(found)
 }
 
 /// Whether a directory holds an artefact of a run, and is none itself.
 pub fn is_run(dir: &Path) -> bool {
     let is_artefact = dir.join("meta").is_dir() || dir.join(dataset::TRAIN).is_dir() || dir.join(dataset::VALIDATION).is_dir();
-    !is_artefact && recording::files(dir).is_ok_and(|files| files.is_empty()) && artefacts(dir).is_ok_and(|found| !found.is_empty())
+    !is_artefact
+        && recording::files(dir).is_ok_and(|files| files.is_empty())
+        && artefacts(dir).is_ok_and(|found| !found.is_empty())
 }
 
 fn artefact(path: PathBuf) -> Option<Artefact> {

@@ -56,7 +56,8 @@ pub fn list(dir: &Path, interrupt: &Interrupt) -> Result<Vec<Row>> {
     let mut rows = Vec::new();
     below(dir, dir, DEEPEST, &mut rows, interrupt)?;
     if rows.is_empty() {
-        let message = "holds no run: no policy and no evaluation of hilt below it; make all TASK=stack makes one under runs/stack";
+        let message =
+            "holds no run: no policy and no evaluation of hilt below it; make all TASK=stack makes one under runs/stack";
         return Err(Error::input(dir, message));
     }
     let rate = |row: &Row| row.summary.as_ref().map_or(-1.0, |summary| summary.success_rate);
@@ -121,13 +122,7 @@ fn rows_of(root: &Path, dir: &Path) -> Result<Vec<Row>> {
     Ok(rows)
 }
 
-fn row(
-    dir: &Path,
-    run: String,
-    method: String,
-    trained: Option<&Provenance>,
-    judged: Option<(&Summary, &Provenance)>,
-) -> Row {
+fn row(dir: &Path, run: String, method: String, trained: Option<&Provenance>, judged: Option<(&Summary, &Provenance)>) -> Row {
     let made = judged.map(|(_, made)| made).or(trained).expect("a row is of a policy or of an evaluation");
     let mut settings = BTreeMap::new();
     let above: Vec<&Path> = dir.ancestors().take(ABOVE + 1).collect();

@@ -5,8 +5,8 @@
 mod artefacts;
 mod list;
 mod run;
-mod standing;
 mod stamp;
+mod standing;
 mod words;
 
 pub use artefacts::{Artefact, artefacts, is_run};

@@ -74,9 +74,7 @@ impl Run {
 
     /// For machines.
     pub fn to_json(&self) -> Value {
-        let method = |judged: &Judged| {
-            json!({ "method": judged.method, "evaluation": judged.path.display().to_string(), "summary": judged.summary })
-        };
+        let method = |judged: &Judged| json!({ "method": judged.method, "evaluation": judged.path.display().to_string(), "summary": judged.summary });
         let bytes: u64 = self.stages.iter().map(|standing| standing.bytes).sum();
         let walls: Vec<f64> = self.stages.iter().filter_map(|standing| standing.wall_s).collect();
         json!({
@@ -196,7 +194,10 @@ fn missing(dir: &Path, stages: &mut Vec<Standing>) {
         let path = dir.join(name);
         let begun = match stage {
             Stage::Plan | Stage::Simulate => path.with_extension("unfinished").is_dir().then_some("its command goes on"),
-            Stage::Train => path.with_extension("checkpoint.safetensors").is_file().then_some("hilt train --resume, or make all RESUME=1, goes on"),
+            Stage::Train => path
+                .with_extension("checkpoint.safetensors")
+                .is_file()
+                .then_some("hilt train --resume, or make all RESUME=1, goes on"),
             _ => None,
         };
         let condition = if begun.is_some() { Condition::Unfinished } else { Condition::Missing };

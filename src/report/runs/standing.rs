@@ -103,7 +103,9 @@ impl Standing {
             let there: Vec<&&Standing> = before.iter().filter(|other| other.stage == stage && other.origin.is_some()).collect();
             let same = there.iter().find(|other| other.origin.as_ref().is_some_and(|(_, content)| content.to_string() == *hash));
             match (same, there.first()) {
-                (Some(same), _) if same.condition == Condition::Stale => return Some(format!("it follows {}, which is stale", same.name)),
+                (Some(same), _) if same.condition == Condition::Stale => {
+                    return Some(format!("it follows {}, which is stale", same.name));
+                }
                 (None, Some(other)) => return Some(format!("it was made from another {}", file_name(&other.path))),
                 _ => {}
             }
@@ -115,9 +117,13 @@ impl Standing {
     fn by_stamp(&mut self, dir: &Path, before: &[&Standing]) -> Option<String> {
         let stamp = Stamp::read(dir, &self.name)?;
         let (made, _) = self.origin.as_ref()?;
-        let last = made.inputs.keys().filter_map(|role| stage_of(role)).max_by_key(|stage| *stage as usize);
-        let before = before.iter().find(|other| Some(other.stage) == last);
-        let files = before.and_then(|other| Stamp::read(dir, &other.name)).map(|stamp| stamp.files()).unwrap_or_default();
+        let last = made.inputs.iter().max_by_key(|(role, _)| stage_of(role).map(|stage| stage as usize));
+        let is_last = |other: &&&Standing| {
+            let content = other.origin.as_ref().map(|(_, content)| content.to_string());
+            last.is_some_and(|(role, hash)| stage_of(role) == Some(other.stage) && content.as_ref() == Some(hash))
+        };
+        let files = before.iter().find(is_last).and_then(|other| Stamp::read(dir, &other.name));
+        let files = files.map(|stamp| stamp.files()).unwrap_or_default();
         let why = stamp.stale(&files).map(String::from);
         if why.is_none() && !stamp.as_left() {
             self.why = Some("it is not the one that make left there".into());
