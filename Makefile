@@ -26,6 +26,8 @@ METHOD ?= hil
 RESUME ?=
 # Seconds between two checkpoints of training.
 CHECKPOINT ?= 60
+# 1: training writes its metrics as they come beside the policy, for hilt plot --watch RUNS/TASK.
+LIVE   ?=
 # Overrides, separated by blanks: SET="plan.speed=0.5 train.rho=0.3"; a blank inside brackets or quotes belongs to the value.
 SET    ?=
 # An experiment's name; its seeds (0-4,9) and episodes, and how many of its steps run side by side, where not as its file or hilt has them.
@@ -62,6 +64,7 @@ override METHOD     := $(strip $(call typed,METHOD))
 override ROBOT      := $(call typed,ROBOT)
 override RESUME     := $(strip $(call typed,RESUME))
 override CHECKPOINT := $(strip $(call typed,CHECKPOINT))
+override LIVE       := $(strip $(call typed,LIVE))
 override SET        := $(call typed,SET)
 override NAME       := $(strip $(call typed,NAME))
 override SEEDS      := $(strip $(call typed,SEEDS))
@@ -88,6 +91,7 @@ $(if $(TASK_FILE),$(if $(call is-odd,$(notdir $(TASK)))$(filter -%,$(TASK)),$(er
 $(call one-of,PRESET,$(PRESETS))
 $(call one-of,METHOD,$(METHODS))
 $(if $(RESUME),$(call one-of,RESUME,0 1))
+$(if $(LIVE),$(call one-of,LIVE,0 1))
 $(call number,SEED)
 $(call number,THREADS)
 $(call number,CHECKPOINT)
@@ -174,7 +178,7 @@ $(STAMP)/pretrain.toml: $(STAMP)/convert.toml
 
 $(STAMP)/train$(OF).toml: $(LEARNS_FROM:%=$(STAMP)/%.toml)
 	@$(MADE) start train $(SETTINGS)
-	$(HILT) train $(FLAGS) $(call RUN,train$(OF)) --method $(METHOD) $(if $(LEARNS_FROM),--dataset $(DATASET)) $(if $(filter pretrain,$(LEARNS_FROM)),--dynamics $(DYNAMICS)) --out $(POLICY) --checkpoint-every $(CHECKPOINT) $(if $(filter 1,$(RESUME)),--resume)
+	$(HILT) train $(FLAGS) $(call RUN,train$(OF)) --method $(METHOD) $(if $(LEARNS_FROM),--dataset $(DATASET)) $(if $(filter pretrain,$(LEARNS_FROM)),--dynamics $(DYNAMICS)) --out $(POLICY) --checkpoint-every $(CHECKPOINT) $(if $(filter 1,$(RESUME)),--resume)$(if $(filter 1,$(LIVE)), --live $(POLICY:.safetensors=.training.jsonl))
 	@$(MADE) done train
 
 $(STAMP)/evaluate$(OF).toml: $(STAMP)/train$(OF).toml
@@ -293,7 +297,7 @@ clean-runs: ## remove what was made for TASK under RUNS; files that make did not
 
 help: ## this list
 	@echo "make TARGET [TASK=$(subst $( ) ,|,$(TASKS))|FILE.toml] [ROBOT=jaco|panda|ur5e|FILE.toml] [RUNS=DIR] [SEED=N] [THREADS=N] [PRESET=best|mended|paper] [PIPELINE=FILE]"
-	@echo "            [METHOD=hil|bc|sc|ppo|bc-rl] [RESUME=1] [CHECKPOINT=SECONDS] [SET=\"stage.key=value ...\"]"
+	@echo "            [METHOD=hil|bc|sc|ppo|bc-rl] [RESUME=1] [LIVE=1] [CHECKPOINT=SECONDS] [SET=\"stage.key=value ...\"]"
 	@echo "            experiments: [NAME=$(subst $( ) ,|,$(EXPERIMENTS))] [SEEDS=0-4,9] [EPISODES=N] [JOBS=N]"
 	@awk -F ':.*## ' '/^[a-z0-9 -]+:.*## / { printf "  %-12s %s\n", $$1, $$2 }' $(firstword $(MAKEFILE_LIST))
 	@echo "RUNS is a directory without blanks and special characters. METHOD=bc writes policy-bc.safetensors and evaluation-bc.json beside those of hil."

@@ -14,7 +14,9 @@ fn main() -> Result<(), Box<dyn Error>> {
     let out = std::env::var("OUT_DIR")?;
     let mut descriptors = protox::compile(["hilt.proto"], ["proto"])?;
     prost_build::Config::new().compile_fds(descriptors.clone())?;
-    prost_build::Config::new().compile_fds(protox::compile(["onnx.proto"], ["proto"])?)?;
+    for of_others in ["onnx.proto", "tensorboard.proto"] {
+        prost_build::Config::new().compile_fds(protox::compile([of_others], ["proto"])?)?;
+    }
     // Readers need the types, not the comments.
     descriptors.file.iter_mut().for_each(|file| file.source_code_info = None);
     std::fs::write(Path::new(&out).join("hilt.descriptors"), descriptors.encode_to_vec())?;

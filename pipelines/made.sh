@@ -8,7 +8,8 @@
 #   made.sh RUN METHOD clean                    removes what make made, and nothing else
 #
 # COMMAND with `--stage STAGE` prints a stage's settings. Sizes are compared, not hashes: a `make all` that has nothing to do reads no
-# gigabytes. Damage that leaves the size as it is, is found by the stage that reads the file.
+# gigabytes. Damage that leaves the size as it is, is found by the stage that reads the file. `hilt inspect RUN` goes by the same notes
+# (src/report/runs/stamp.rs).
 set -u -o pipefail
 shopt -s nullglob
 export LC_ALL=C
@@ -166,7 +167,7 @@ clean() {
     cd "$run" || exit
     local of method
     for method in '' -bc -sc -ppo -bc-rl; do
-        rm -f "policy$method".{safetensors,checkpoint.safetensors,training.parquet} "evaluation$method".{json,parquet,episodes.parquet}
+        rm -f "policy$method".{safetensors,checkpoint.safetensors,training.parquet,training.jsonl} "evaluation$method".{json,parquet,episodes.parquet}
     done
     rm -f plans.parquet dynamics.{safetensors,parquet,errors.parquet,pretraining.parquet} {pre,}training.parquet episode-00000.png
     rm -rf {plans,recordings}.unfinished/{run-*,.hilt-*}

@@ -3,7 +3,7 @@
 use super::console::Console;
 use super::context::{Context, Outcome};
 use super::{
-    completions, convert, dataset, doctor, evaluate, experiment, export, inspect, man, plan, pretrain, render, report, robot,
+    compare, completions, convert, dataset, doctor, evaluate, experiment, export, inspect, man, plan, plot, pretrain, render, report, robot, runs,
     serve, serve_env, settings, simulate, train,
 };
 use crate::error::{Error, Result};
@@ -51,6 +51,9 @@ enum Command {
     Train(train::Args),
     Evaluate(evaluate::Args),
     Inspect(inspect::Args),
+    Runs(runs::Args),
+    Compare(compare::Args),
+    Plot(plot::Args),
     Dataset(dataset::Args),
     Render(render::Args),
     Settings(settings::Args),
@@ -88,12 +91,16 @@ impl Cli {
             Command::Evaluate(args) => evaluate::run(args, &context),
             Command::Experiment(args) => experiment::run(args, &context),
             Command::Report(args) => report::run(args, &context),
+            Command::Export(args) if export::only_answers(args) => return export::run(args, &context),
             Command::Export(args) => export::run(args, &context),
             Command::Dataset(args) if dataset::only_answers(args) => return dataset::run(args, &context),
             Command::Dataset(args) => dataset::run(args, &context),
             Command::Serve(args) => serve::run(args, &context),
             Command::ServeEnv(args) => serve_env::run(args, &context),
             Command::Inspect(args) => return inspect::run(args, &context),
+            Command::Runs(args) => return runs::run(args, &context),
+            Command::Compare(args) => return compare::run(args, &context),
+            Command::Plot(args) => return plot::run(args, &context),
             Command::Render(args) => render::run(args, &context),
             Command::Robot(args) => return robot::run(args, &context),
             Command::Settings(args) => return settings::run(args, &context),

@@ -3,15 +3,17 @@ use super::{Context, Outcome, output, pretrain, train};
 use crate::data::{self, weights};
 use crate::error::{Error, Result};
 use crate::learn::{Dynamics, Policy};
+use crate::report::runs::{Run, is_run};
 use crate::tasks::with_layout;
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 
-/// Say what a file or directory of hilt is: provenance, shapes, counts, statistics.
+/// Say what a file or directory of hilt is: of a run its success, its stages and what of them is stale; of an artefact provenance, shapes, counts,
+/// statistics.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  hilt inspect policy.safetensors\n  hilt inspect recordings --json")]
 pub struct Args {
-    /// Plans, recording, directory of recordings, dataset, weights, metrics or evaluation
+    /// A run (runs/stack), or one of its artefacts: plans, recording, directory of recordings, dataset, weights, metrics, evaluation
     #[arg(value_name = "FILE|DIR")]
     path: PathBuf,
     /// Print JSON
@@ -21,6 +23,15 @@ pub struct Args {
 
 pub fn run(args: &Args, context: &Context) -> Result<Outcome> {
     Places::new().read(&args.path).check(&context.console)?;
+    if is_run(&args.path) {
+        let run = Run::read(&args.path, &context.interrupt)?;
+        if args.json {
+            output::print_json(&run.to_json())?
+        } else {
+            output::print(&run.to_text(output::width()))?
+        }
+        return Ok(Outcome::Done);
+    }
     let found = data::inspect(&args.path, &context.interrupt)?;
     check_network(&args.path, &found["network"])?;
     if args.json {

@@ -4,8 +4,57 @@ use crate::error::{Error, Result};
 use crate::report::table::text_table;
 use crate::table::{Table, Values};
 use serde::Serialize;
-use std::io::{ErrorKind, Write, stdout};
+use std::env;
+use std::io::{BufWriter, ErrorKind, IsTerminal, Write, stdout};
 use std::path::Path;
+
+/// Characters of a line on the terminal that stdout is; `None` where it is none: a file or a pipe takes lines of any length.
+pub fn width() -> Option<usize> {
+    size().map(|[width, _]| width)
+}
+
+/// The same with its lines.
+pub fn size() -> Option<[usize; 2]> {
+    let (width, height) = terminal_size::terminal_size_of(stdout())?;
+    Some([width.0.into(), height.0.into()])
+}
+
+/// Whether the terminal that stdout is can be written to anywhere, and shows colours at all.
+pub fn moves() -> bool {
+    stdout().is_terminal() && env::var_os("TERM").is_none_or(|name| name != "dumb" && !name.is_empty())
+}
+
+/// Whether to write in colours: not where NO_COLOR says so (no-color.org), nor into a file.
+pub fn colour() -> bool {
+    moves() && env::var_os("NO_COLOR").is_none_or(|said| said.is_empty())
+}
+
+/// Whether the reader takes more than ASCII: by the language that is set, and not on a simple terminal.
+pub fn unicode() -> bool {
+    let said = ["LC_ALL", "LC_CTYPE", "LANG"].into_iter().find_map(|name| env::var(name).ok().filter(|said| !said.is_empty()));
+    let utf8 = said.is_some_and(|said| said.to_lowercase().replace('-', "").ends_with("utf8"));
+    utf8 && env::var_os("TERM").is_none_or(|name| name != "dumb")
+}
+
+/// What stdout is called in errors.
+pub const NAME: &str = "standard output";
+
+/// Prints as it is made. A reader that has seen enough is no error.
+///
+/// # Errors
+/// What `make` returns for another reason.
+pub fn stream(make: impl FnOnce(&mut dyn Write) -> Result<()>) -> Result<()> {
+    let mut out = BufWriter::new(stdout().lock());
+    let made = make(&mut out);
+    match made {
+        Err(Error::Io { source, .. }) if source.kind() == ErrorKind::BrokenPipe => {
+            // What is left is for nobody.
+            drop(out.into_parts());
+            Ok(())
+        }
+        other => other,
+    }
+}
 
 /// Prints text. A reader that has seen enough (`| head`) is no error.
 ///
@@ -14,7 +63,7 @@ use std::path::Path;
 pub fn print(text: &str) -> Result<()> {
     let mut out = stdout().lock();
     match out.write_all(text.as_bytes()).and_then(|()| out.flush()) {
-        Err(e) if e.kind() != ErrorKind::BrokenPipe => Err(Error::io(Path::new("standard output"), "write", e)),
+        Err(e) if e.kind() != ErrorKind::BrokenPipe => Err(Error::io(Path::new(NAME), "write", e)),
         _ => Ok(()),
     }
 }

@@ -3,7 +3,7 @@
 use super::Console;
 use crate::data::atomic::{self, Target};
 use crate::data::peek::{Format, Peeked, peek};
-use crate::data::{dataset, onnx, recording};
+use crate::data::{dataset, live_file, onnx, recording, tensorboard};
 use crate::error::{Error, Result};
 use crate::interrupt;
 use crate::report::experiments;
@@ -31,6 +31,14 @@ pub enum Content {
     Png,
     /// A GIF animation.
     Gif,
+    /// A chart.
+    Svg,
+    /// Lines for other programs: what stands there already has no sign of who wrote it.
+    Csv,
+    /// Metrics of a training as it goes.
+    Live,
+    /// A directory of TensorBoard's event files.
+    Events,
     /// A directory of recordings of this stage.
     Recordings(&'static str),
     /// A directory with the two datasets.
@@ -48,8 +56,25 @@ pub enum Content {
 }
 
 /// Endings of other formats; what follows another dot belongs to a name (policy-0.1).
-const ENDINGS: [&str; 15] =
-    ["parquet", "safetensors", "onnx", "urdf", "json", "png", "gif", "log", "mcap", "toml", "txt", "csv", "pt", "pth", "bin"];
+const ENDINGS: [&str; 17] = [
+    "parquet",
+    "safetensors",
+    "onnx",
+    "urdf",
+    "json",
+    "jsonl",
+    "png",
+    "gif",
+    "svg",
+    "log",
+    "mcap",
+    "toml",
+    "txt",
+    "csv",
+    "pt",
+    "pth",
+    "bin",
+];
 
 /// Inputs and outputs of one command.
 #[derive(Debug, Default)]
@@ -103,6 +128,7 @@ impl Places {
                 Content::Datasets => atomic::check_directory(path, dataset::is_file)?,
                 Content::Dataset => atomic::check_directory(path, dataset::is_root_file)?,
                 Content::Report => atomic::check_directory(path, experiments::is_file)?,
+                Content::Events => atomic::check_directory(path, tensorboard::is_file)?,
                 Content::Pieces => atomic::check_place(&path.join("a piece"))?,
                 _ => atomic::check_place(path)?,
             }
@@ -178,10 +204,17 @@ fn check_ending(name: &str, path: &Path, content: Content) -> Result<()> {
         Content::Man => ("1", "a manual page"),
         Content::Png => ("png", "a PNG picture"),
         Content::Gif => ("gif", "a GIF animation"),
+        Content::Svg => ("svg", "an SVG picture"),
+        Content::Csv => ("csv", "a CSV file"),
+        Content::Live => (live_file::ENDING, "a file with a line of JSON an epoch"),
         Content::Log => ("log", "a log"),
-        Content::Recordings(_) | Content::Datasets | Content::Dataset | Content::Report | Content::Pieces | Content::Own => {
-            return Ok(());
-        }
+        Content::Recordings(_)
+        | Content::Datasets
+        | Content::Dataset
+        | Content::Report
+        | Content::Pieces
+        | Content::Own
+        | Content::Events => return Ok(()),
     };
     if matches!(atomic::target(path)?, Target::Stream(_)) || path.extension() == Some(OsStr::new(ending)) {
         return Ok(());
@@ -202,7 +235,8 @@ fn check_held(name: &str, path: &Path, content: Content) -> Result<()> {
         Content::Urdf | Content::Man => (Format::Marked, None, None),
         Content::Png => (Format::Png, None, None),
         Content::Gif => (Format::Gif, None, None),
-        Content::Log | Content::Report | Content::Pieces | Content::Own => return Ok(()),
+        Content::Log | Content::Report | Content::Pieces | Content::Own | Content::Events => return Ok(()),
+        Content::Svg | Content::Csv | Content::Live => return check_text(name, path, content),
         Content::Datasets | Content::Dataset => return check_dataset(name, path),
         Content::Recordings(stage) => return check_recordings(name, path, stage),
     };
@@ -213,6 +247,21 @@ fn check_held(name: &str, path: &Path, content: Content) -> Result<()> {
     let Some(holds) = differs(&found, format, stage, kind) else { return Ok(()) };
     let path = path.display();
     Err(Error::Usage(format!("{name} {path}: holds {holds}, which would be lost; move it away or choose another name")))
+}
+
+/// Text that stands in the place of text: only what is known to be of the same kind is replaced.
+fn check_text(name: &str, path: &Path, content: Content) -> Result<()> {
+    let empty = fs::metadata(path).is_ok_and(|found| found.len() == 0);
+    let ours = || match content {
+        Content::Svg => fs::read(path).is_ok_and(|bytes| bytes.trim_ascii_start().starts_with(b"<svg")),
+        Content::Live => live_file::is_ours(path),
+        _ => false,
+    };
+    if is_stream(path) || !path.is_file() || empty || ours() {
+        return Ok(());
+    }
+    let path = path.display();
+    Err(Error::Usage(format!("{name} {path}: is there already, and would be lost; move it away or choose another name")))
 }
 
 /// A dataset that another program wrote has the same files, but is not hilt's to replace.

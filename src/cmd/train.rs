@@ -2,6 +2,7 @@ use super::checkpoint::{self, Keeper};
 use super::common::SettingsArgs;
 use super::epochs::Epochs;
 use super::learning::{ColumnArgs, Demos, Learning};
+use super::live::{Live, LiveArgs};
 use super::places::{Content, beside};
 use super::{Console, Context, Outcome};
 use crate::config::{Pipeline, Stage};
@@ -59,6 +60,8 @@ pub struct Args {
     /// Time between two checkpoints; 0 = only when training is interrupted
     #[arg(long, value_name = "SECONDS", default_value_t = 60)]
     checkpoint_every: u64,
+    #[command(flatten)]
+    live: LiveArgs,
 }
 
 pub fn run(args: &Args, context: &Context) -> Result<Outcome> {
@@ -82,7 +85,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome> {
     let places =
         places.write("--out", &out, Content::Weights(KIND, "train")).write("--metrics", &metrics, Content::Table("train"));
     let checkpoint = if args.resume { Content::Own } else { Content::Weights(weights::CHECKPOINT, "train") };
-    places.write("the checkpoint", &kept, checkpoint).check(&context.console)?;
+    args.live.places(places.write("the checkpoint", &kept, checkpoint)).check(&context.console)?;
     let (demos, dataset) = needs_demos.then(|| read_demos(&mut learning, &args.settings, context)).transpose()?.unzip();
     let (dynamics, model) = needs_model.then(|| learning.dynamics(&model)).transpose()?.unzip();
     let inputs = [dataset.map(|content| ("dataset", content)), model.map(|content| ("dynamics", content))];
@@ -109,8 +112,12 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome> {
         Some(inputs) => imitator(args.method, inputs, dynamics, settings, seed)?,
     };
     let mut epochs = Epochs::new(console);
+    let mut live = Live::begin(&args.live, resume.as_ref(), learner.metrics(), console)?;
     let hooks = Hooks {
-        log: Box::new(|epoch, metrics| epochs.step(epoch, metrics)),
+        log: Box::new(|epoch, metrics| {
+            epochs.step(epoch, metrics);
+            live.step(epoch, metrics);
+        }),
         score: Box::new(|policy| successes(learning.simulated("train.select_episodes")?, seed, policy, &context.interrupt)),
         keep: Box::new(|checkpoint| keeper.keep(checkpoint)),
         keep_every: (args.checkpoint_every > 0).then(|| Duration::from_secs(args.checkpoint_every)),

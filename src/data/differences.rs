@@ -48,6 +48,13 @@ pub fn differences(root: &str, theirs: &Value, ours: &Value) -> Vec<Difference> 
     keys.map(|key| Difference { key: key.clone(), theirs: missing(&theirs, key), ours: missing(&ours, key) }).collect()
 }
 
+/// All values of a settings object by their dotted keys, in order.
+pub fn flattened(settings: &Value) -> Vec<(String, Value)> {
+    let mut found = Vec::new();
+    flatten("", settings, &mut found);
+    found
+}
+
 /// Objects as dotted keys.
 fn flatten(name: &str, value: &Value, out: &mut Vec<(String, Value)>) {
     match value {

@@ -4,11 +4,13 @@
 //! `select.scene` and `select.noise`. Demonstrations are drawn from `plan.scene` and `simulate.noise`: the purpose is part of a
 //! stream's name, so that no evaluation episode repeats a demonstration or had a say in the selection, whatever the seeds.
 
+mod difference;
 mod log;
 mod policy;
 mod summary;
 mod wilson;
 
+pub use difference::{Pairs, newcombe_95};
 pub use log::to_table;
 pub use policy::PolicyController;
 pub use summary::{Percentiles, Summary};

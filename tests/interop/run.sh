@@ -11,4 +11,5 @@ HF_HUB_OFFLINE=1 HF_HOME="$home/huggingface" "$home/venv/bin/python" "$here/run.
 "$home/venv/bin/python" "$here/viewers.py" "$1"/*/recordings/episode-00000.mcap
 "$home/venv/bin/python" "$here/policies.py" "$1" "$2"
 "$home/venv/bin/python" "$here/wire.py" "$2" "$1"
+"$home/venv/bin/python" "$here/board.py" "$2" "$1"/pick-up/policy.training.parquet "$1"/pick-up/dynamics.pretraining.parquet
 HF_HUB_OFFLINE=1 HF_HOME="$home/huggingface" exec "$home/venv/bin/python" "$here/foreign.py" "$2" "$here/../../fixtures/foreign" "$1/pick-up/dataset/train"

@@ -2,6 +2,7 @@
 
 mod artefacts;
 mod binary;
+mod inspected;
 mod methods;
 mod stopped;
 mod variables;

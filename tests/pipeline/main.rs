@@ -1,4 +1,4 @@
-//! The stages as processes, chained over files: bad input, interruption, full disks, reproducibility, and the files in `fixtures/`.
+//! The stages as processes, chained over files: bad input, interruption, full disks, looking at runs, reproducibility, and the files in `fixtures/`.
 
 mod bad_input;
 mod bad_numbers;
@@ -15,3 +15,4 @@ mod ppo;
 mod reproducible;
 mod resume;
 mod runs;
+mod seen;

@@ -55,6 +55,14 @@ pub fn frames(root: &Path) -> Result<usize> {
     check::info(root).map(|info| info.frames)
 }
 
+/// Its episodes, as its description counts them.
+///
+/// # Errors
+/// As [`provenance`].
+pub fn episodes(root: &Path) -> Result<usize> {
+    check::info(root).map(|info| info.episodes)
+}
+
 /// Writes one dataset of a robot in a task; an older one there is replaced when the new one is whole.
 ///
 /// # Errors

@@ -46,7 +46,10 @@ pub(super) fn one(path: &Path) -> Result<Value> {
 pub(super) fn all(dir: &Path, interrupt: &Interrupt) -> Result<Value> {
     let files = recording::files(dir)?;
     if files.is_empty() {
-        return Err(Error::input(dir, "is neither a dataset nor a directory of recordings (episode-00000.mcap, ...)"));
+        return Err(Error::input(
+            dir,
+            "is neither a run, a dataset nor a directory of recordings (episode-00000.mcap, ...); hilt runs lists the runs below it",
+        ));
     }
     let (mut all, mut origins) = (Counts::default(), Origins::default());
     for window in files.chunks(AT_ONCE) {

@@ -37,6 +37,14 @@ impl Checkpoint {
         self.meta.get("after").and_then(Value::as_str).unwrap_or("an unknown epoch")
     }
 
+    /// What was known after each epoch so far.
+    ///
+    /// # Errors
+    /// Says what of the description is missing or does not fit.
+    pub fn rows(&self) -> Result<Vec<EpochMetrics>, String> {
+        Reader { tensors: &self.tensors, meta: &self.meta }.meta("epochs")
+    }
+
     /// Puts a fresh method of the same run into the state; what else the run knows comes back.
     ///
     /// # Errors

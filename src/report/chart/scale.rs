@@ -45,12 +45,25 @@ impl Scale {
         }
     }
 
+    /// From a little below the lowest of some values to a little above the highest.
+    pub(super) fn between(values: impl Iterator<Item = f64>) -> Self {
+        let [low, high] = values.filter(|v| v.is_finite()).fold([f64::MAX, f64::MIN], |[low, high], v| [low.min(v), high.max(v)]);
+        if low > high {
+            return Scale::linear(1.0);
+        }
+        // Of a value that does not change, the axis shows what is around it.
+        let apart = if high > low { high - low } else { high.abs().max(f64::MIN_POSITIVE) };
+        let step = step_within(apart);
+        let (first, last) = ((low / step).floor(), (high / step).ceil());
+        let last = if last > first { last } else { first + 1.0 };
+        let ticks = (0..=(last - first) as u32).map(|i| (first + f64::from(i)) * step).map(|v| (v, number(v))).collect();
+        Scale { low: first * step, high: last * step, log: false, ticks }
+    }
+
     /// From 0 to `most`, or a little more.
     fn linear(most: f64) -> Self {
         let most = if most > 0.0 { most } else { 1.0 };
-        let decade = math::pow(10.0, math::log10(most).floor() - 1.0);
-        let steps = [1.0, 2.0, 5.0, 10.0, 20.0, 50.0].map(|step| step * decade);
-        let step = steps.into_iter().find(|step| most / step <= MOST_TICKS).unwrap_or(most);
+        let step = step_within(most);
         let count = (most / step).ceil() as u32;
         let ticks = (0..=count).map(|i| (f64::from(i) * step, number(f64::from(i) * step))).collect();
         Scale { low: 0.0, high: f64::from(count) * step, log: false, ticks }
@@ -78,6 +91,13 @@ impl Scale {
     }
 }
 
+/// A round step of which at most [`MOST_TICKS`] fit into a range.
+fn step_within(range: f64) -> f64 {
+    let decade = math::pow(10.0, math::log10(range).floor() - 1.0);
+    let steps = [1.0, 2.0, 5.0, 10.0, 20.0, 50.0].map(|step| step * decade);
+    steps.into_iter().find(|step| range / step <= MOST_TICKS).unwrap_or(range)
+}
+
 /// Steps of an axis of shares, the finest first; the first with at most [`MOST_TICKS`] steps is taken.
 const SHARE_STEPS: [f64; 5] = [0.01, 0.02, 0.05, 0.1, 0.2];
 
@@ -89,8 +109,11 @@ pub(super) fn up_to_one(lowest: f64) -> (f64, f64) {
     (floor(step), step)
 }
 
-/// `0.5`, `200`, `50k`, `2M`.
-fn number(value: f64) -> String {
+/// What is nearer to 0 is written with its power of ten.
+const SMALLEST_PLAIN: f64 = 1e-3;
+
+/// `0.5`, `200`, `50k`, `2M`, `2e-4`.
+pub fn number(value: f64) -> String {
     let short = |value: f64| {
         let text = format!("{value:.3}");
         text.trim_end_matches('0').trim_end_matches('.').to_string()
@@ -98,6 +121,7 @@ fn number(value: f64) -> String {
     match value {
         v if v >= 1e6 => short(v / 1e6) + "M",
         v if v >= 1e4 => short(v / 1e3) + "k",
+        v if v != 0.0 && v.abs() < SMALLEST_PLAIN => format!("{v:.1e}").replace(".0e", "e"),
         v => short(v),
     }
 }
@@ -118,6 +142,18 @@ mod tests {
         assert_eq!(ticks(&Scale::over(&Axis::Log, [10.0, 100.0].into_iter())), ["10", "20", "50", "100"]);
         assert_eq!(ticks(&Scale::over(&Axis::Log, [9e3, 4e6].into_iter())), ["10k", "100k", "1M"]);
         assert_eq!(ticks(&Scale::over(&Axis::Linear, std::iter::empty())).len(), 6);
+    }
+
+    #[test]
+    fn an_axis_between_values_has_room_for_negative_ones_and_for_one_that_does_not_change() {
+        assert_eq!(ticks(&Scale::between([-7.0, 12.0].into_iter())), ["-10", "-5", "0", "5", "10", "15"]);
+        assert_eq!(
+            ticks(&Scale::between([2e-5, 5e-5].into_iter())),
+            ["2e-5", "2.5e-5", "3e-5", "3.5e-5", "4e-5", "4.5e-5", "5e-5"]
+        );
+        let flat = Scale::between([0.8].into_iter());
+        assert!(flat.low <= 0.8 && flat.high > 0.8 && flat.ticks.len() > 1, "{:?}", flat.ticks);
+        assert!(Scale::between([0.0].into_iter()).share(0.0).is_finite());
     }
 
     #[test]

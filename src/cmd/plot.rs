@@ -1,0 +1,143 @@
+use super::places::{Content, Places};
+use super::{Context, Outcome, output};
+use crate::data::atomic;
+use crate::error::{Error, Result};
+use crate::report::curves::{Plot, Style, columns, draw, latest, live_of, picture, plots, sources};
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::thread::sleep;
+use std::time::{Duration, SystemTime};
+
+/// Draw curves of training on the terminal or as SVG: d_conv and alpha, losses, validation, norms of gradients, the dynamics network's error; several runs
+/// over each other.
+///
+/// Each stage of training is as wide as the next. --watch draws again whenever a training has written more (hilt train --live, make all LIVE=1) and ends
+/// with it.
+///
+/// Example: hilt plot runs/stack --metric d_conv --metric alpha
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// Runs, tables of metrics (policy.training.parquet, dynamics.pretraining.parquet), or what hilt train --live writes
+    #[arg(value_name = "RUN|FILE", required = true)]
+    of: Vec<PathBuf>,
+    /// Draw this metric, a column of the table; may be repeated [default: those that say most]
+    #[arg(long, value_name = "NAME")]
+    metric: Vec<String>,
+    /// Write a picture instead
+    #[arg(long, value_name = "FILE.svg")]
+    out: Option<PathBuf>,
+    /// Draw again whenever there is more, until training ends or Ctrl-C
+    #[arg(long, conflicts_with = "out")]
+    watch: bool,
+}
+
+/// Characters of a line where stdout is no terminal.
+const WIDTH: usize = 80;
+/// Lines of a plot.
+const HEIGHT: usize = 7;
+/// Lines that a plot has beside those: title, axis, names of stages.
+const AROUND: usize = 3;
+/// Between two looks at a file that grows.
+const TICK: Duration = Duration::from_millis(300);
+/// To the upper left corner; clears to the end of a line, and below.
+const HOME: &str = "\u{1b}[H";
+const TO_END: &str = "\u{1b}[K\n";
+const BELOW: &str = "\u{1b}[J";
+const CLEAR: &str = "\u{1b}[2J";
+
+pub fn run(args: &Args, context: &Context) -> Result<Outcome> {
+    let read = args.of.iter().map(PathBuf::as_path);
+    let places = args.out.iter().fold(Places::new().read_all(read), |places, out| places.write("--out", out, Content::Svg));
+    places.check(&context.console)?;
+    if args.watch {
+        return watch(args, context);
+    }
+    let found = drawn(&args.of, args, context)?;
+    let Some(out) = &args.out else {
+        output::print(&draw(&found, &style(None)))?;
+        return Ok(Outcome::Done);
+    };
+    let names: Vec<String> = args.of.iter().map(|path| path.display().to_string()).collect();
+    atomic::write_bytes(out, picture("training", &format!("Training: {}", names.join(", ")), &found).to_svg().as_bytes())?;
+    context.console.say(&format!("plot: wrote {}", out.display()));
+    Ok(Outcome::Done)
+}
+
+fn drawn(of: &[PathBuf], args: &Args, context: &Context) -> Result<Vec<Plot>> {
+    plots(&sources(of, &context.interrupt)?, &args.metric).map_err(Error::Usage)
+}
+
+/// As the terminal is; where it has so many `plots`, lower, so that all of them fit.
+fn style(plots: Option<usize>) -> Style {
+    let size = output::size();
+    let width = size.map_or(WIDTH, |[width, _]| width);
+    let mut style = Style { width, height: HEIGHT, colour: output::colour(), unicode: output::unicode() };
+    if let (Some([_, lines]), Some(plots)) = (size, plots) {
+        let rows = plots.div_ceil(columns(width, plots)).max(1);
+        // One for the legend, one for the cursor.
+        style.height = ((lines.saturating_sub(2)) / rows).saturating_sub(AROUND).clamp(2, HEIGHT);
+    }
+    style
+}
+
+fn watch(args: &Args, context: &Context) -> Result<Outcome> {
+    let [of] = args.of.as_slice() else {
+        return Err(Error::Usage("--watch follows one training: name one run, or one file of hilt train --live".into()));
+    };
+    let (mut seen, mut waits) = (None, false);
+    while !context.interrupt.is_raised() {
+        let live = if of.is_dir() { live_of(of)?.into_iter().next() } else { Some(of.clone()) };
+        match live.filter(|file| file.is_file()) {
+            None if !waits => {
+                let of = of.display();
+                context.console.say(&format!("plot: waits for a training in {of} that writes its metrics: hilt train --live {of}/policy.training.jsonl, or make all LIVE=1"));
+                waits = true;
+            }
+            None => {}
+            Some(file) => {
+                let now = stamp(&file);
+                let over = is_over(&file);
+                if now != seen || over {
+                    show(&file, args, context, seen.is_none())?;
+                    seen = now;
+                }
+                if over {
+                    context.console.say("plot: training has ended");
+                    return Ok(Outcome::Done);
+                }
+            }
+        }
+        sleep(TICK);
+    }
+    Ok(Outcome::Done)
+}
+
+/// Time and size.
+fn stamp(path: &Path) -> Option<(SystemTime, u64)> {
+    let found = fs::metadata(path).ok()?;
+    Some((found.modified().ok()?, found.len()))
+}
+
+/// Whether the table that training ends with stands beside, and is newer.
+fn is_over(live: &Path) -> bool {
+    let table = stamp(&live.with_extension("parquet"));
+    table.is_some_and(|(time, _)| stamp(live).is_some_and(|(last, _)| time >= last))
+}
+
+/// In place on a terminal that can, a line where stdout is none or a simple one.
+fn show(file: &Path, args: &Args, context: &Context, first: bool) -> Result<()> {
+    let found = sources(&[file.to_path_buf()], &context.interrupt)?;
+    let can = output::size().is_some() && output::moves();
+    if !can || found[0].metrics.rows() == 0 {
+        return output::print(&format!("{}\n", latest(&found[0])));
+    }
+    let mut plots = plots(&found, &args.metric).map_err(Error::Usage)?;
+    let fits = output::size().map_or(plots.len(), |[width, lines]| {
+        let rows = (lines.saturating_sub(2) / (AROUND + 2)).max(1);
+        rows * columns(width, plots.len())
+    });
+    plots.truncate(fits);
+    let text = draw(&plots, &style(Some(plots.len())));
+    let begin = if first { format!("{CLEAR}{HOME}") } else { HOME.into() };
+    output::print(&format!("{begin}{}{BELOW}", text.replace('\n', TO_END)))
+}
