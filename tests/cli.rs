@@ -3,7 +3,7 @@
 use assert_cmd::Command;
 use std::fs;
 
-const STAGES: [&str; 12] = [
+const STAGES: [&str; 14] = [
     "plan",
     "simulate",
     "convert",
@@ -11,7 +11,9 @@ const STAGES: [&str; 12] = [
     "train",
     "evaluate",
     "inspect",
+    "view",
     "render",
+    "replay",
     "settings",
     "export",
     "serve",

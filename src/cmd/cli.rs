@@ -3,8 +3,8 @@
 use super::console::Console;
 use super::context::{Context, Outcome};
 use super::{
-    convert, dataset, evaluate, experiment, export, inspect, plan, pretrain, render, report, robot, serve, serve_env, settings,
-    simulate, train,
+    convert, dataset, evaluate, experiment, export, inspect, plan, pretrain, render, replay, report, robot, serve, serve_env,
+    settings, simulate, train, view,
 };
 use crate::error::{Error, Result};
 use crate::interrupt::Interrupt;
@@ -52,7 +52,9 @@ enum Command {
     Evaluate(evaluate::Args),
     Inspect(inspect::Args),
     Dataset(dataset::Args),
+    View(view::Args),
     Render(render::Args),
+    Replay(replay::Args),
     Settings(settings::Args),
     Experiment(experiment::Args),
     Report(report::Args),
@@ -91,7 +93,9 @@ impl Cli {
             Command::Serve(args) => serve::run(args, &context),
             Command::ServeEnv(args) => serve_env::run(args, &context),
             Command::Inspect(args) => return inspect::run(args, &context),
+            Command::View(args) => view::run(args, &context),
             Command::Render(args) => render::run(args, &context),
+            Command::Replay(args) => replay::run(args, &context),
             Command::Robot(args) => return robot::run(args, &context),
             Command::Settings(args) => return settings::run(args, &context),
         };

@@ -27,6 +27,10 @@ pub enum Content {
     Png,
     /// A GIF animation.
     Gif,
+    /// A page to look at episodes.
+    Page,
+    /// A recording of this stage.
+    Recording(&'static str),
     /// A directory of recordings of this stage.
     Recordings(&'static str),
     /// A directory with the two datasets.
@@ -44,8 +48,8 @@ pub enum Content {
 }
 
 /// Endings of other formats; what follows another dot belongs to a name (policy-0.1).
-const ENDINGS: [&str; 14] =
-    ["parquet", "safetensors", "onnx", "json", "png", "gif", "log", "mcap", "toml", "txt", "csv", "pt", "pth", "bin"];
+const ENDINGS: [&str; 15] =
+    ["parquet", "safetensors", "onnx", "json", "png", "gif", "html", "log", "mcap", "toml", "txt", "csv", "pt", "pth", "bin"];
 
 /// Inputs and outputs of one command.
 #[derive(Debug, Default)]
@@ -172,6 +176,8 @@ fn check_ending(name: &str, path: &Path, content: Content) -> Result<()> {
         Content::Onnx => ("onnx", "an ONNX file"),
         Content::Png => ("png", "a PNG picture"),
         Content::Gif => ("gif", "a GIF animation"),
+        Content::Page => ("html", "a page"),
+        Content::Recording(_) => ("mcap", "a recording"),
         Content::Log => ("log", "a log"),
         Content::Recordings(_) | Content::Datasets | Content::Dataset | Content::Report | Content::Pieces | Content::Own => {
             return Ok(());
@@ -195,6 +201,8 @@ fn check_held(name: &str, path: &Path, content: Content) -> Result<()> {
         Content::Onnx => (Format::Onnx, Some(onnx::EXPORT), None),
         Content::Png => (Format::Png, None, None),
         Content::Gif => (Format::Gif, None, None),
+        Content::Page => (Format::Html, Some("view"), None),
+        Content::Recording(stage) => (Format::Mcap, Some(stage), None),
         Content::Log | Content::Report | Content::Pieces | Content::Own => return Ok(()),
         Content::Datasets | Content::Dataset => return check_dataset(name, path),
         Content::Recordings(stage) => return check_recordings(name, path, stage),

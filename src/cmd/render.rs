@@ -1,18 +1,23 @@
+use super::page::{self, PageArgs};
 use super::places::{Content, Places};
 use super::{Context, Outcome};
-use crate::data::{atomic, recording};
-use crate::error::Result;
+use crate::data::{atomic, recording as file};
+use crate::error::{Error, Result};
 use crate::report::render::{GifOptions, write_gif, write_png_sheet};
 use std::path::{Path, PathBuf};
 
-/// Draw a recorded episode: an animated GIF, or a contact sheet as PNG.
+/// Draw a recorded episode: an animated GIF, or a contact sheet as PNG; or episodes as a page to turn and play.
+///
+/// Example: hilt render rollouts/episode-00000.mcap --gif
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// Recording
-    #[arg(value_name = "FILE.mcap")]
-    recording: PathBuf,
+    /// Recording; for a page several, directories of them or runs
+    #[arg(value_name = "FILE.mcap", required = true)]
+    recordings: Vec<PathBuf>,
     #[command(flatten)]
     format: Format,
+    #[command(flatten)]
+    page: PageArgs,
     /// Width of a picture in pixels
     #[arg(long, value_name = "PIXELS", default_value_t = 480)]
     width: u32,
@@ -31,7 +36,7 @@ pub struct Args {
     /// Contact sheet: rows of pictures
     #[arg(long, value_name = "N", default_value_t = 3)]
     rows: u32,
-    /// File to write [default: in the working directory, the recording's name with .gif or .png]
+    /// File to write [default: in the working directory, the recording's name with .gif, .png or .html]
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
 }
@@ -45,15 +50,26 @@ struct Format {
     /// Write a contact sheet
     #[arg(long)]
     png: bool,
+    /// Write a page, as hilt view does
+    #[arg(long)]
+    html: bool,
 }
 
 pub fn run(args: &Args, context: &Context) -> Result<Outcome> {
+    if args.format.html {
+        let out = page::write(&args.recordings, &args.page, args.out.as_deref(), context)?;
+        context.console.say(&format!("render: wrote {}", out.display()));
+        return Ok(Outcome::Done);
+    }
+    let [recording] = args.recordings.as_slice() else {
+        return Err(Error::Usage(format!("{} recordings: a picture shows one; several go on a page with --html", args.recordings.len())));
+    };
     let (ending, content) = if args.format.gif { ("gif", Content::Gif) } else { ("png", Content::Png) };
     // Not beside the recording: a directory of recordings is an artefact of its own.
-    let name = || Path::new(args.recording.file_name().unwrap_or_default()).with_extension(ending);
+    let name = || Path::new(recording.file_name().unwrap_or_default()).with_extension(ending);
     let out = args.out.clone().unwrap_or_else(name);
-    Places::new().read(&args.recording).write("--out", &out, content).check(&context.console)?;
-    let (episode, _) = recording::read(&args.recording)?;
+    Places::new().read(recording).write("--out", &out, content).check(&context.console)?;
+    let (episode, _) = file::read(recording)?;
     let size = (args.width, args.height);
     let mut bytes = Vec::new();
     if args.format.gif {

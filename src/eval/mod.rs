@@ -6,11 +6,13 @@
 
 mod log;
 mod policy;
+mod replay;
 mod summary;
 mod wilson;
 
 pub use log::to_table;
 pub use policy::PolicyController;
+pub use replay::{Moment, Replay};
 pub use summary::{Percentiles, Summary};
 pub use wilson::wilson_95;
 

@@ -7,3 +7,4 @@ pub mod paper;
 pub mod render;
 pub mod statistics;
 pub mod table;
+pub mod view;
