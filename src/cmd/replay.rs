@@ -37,7 +37,7 @@ pub struct Args {
     #[arg(long, value_name = "S")]
     seed: Option<u64>,
     /// Variance of the noise on every command from the moment on \[(rad/s)^2\] [default: the recording's]
-    #[arg(long, value_name = "VARIANCE")]
+    #[arg(long, value_name = "VARIANCE", allow_negative_numbers = true)]
     noise: Option<f64>,
     /// Control steps before the episode is given up, those before the moment too [default: the recording's, or the policy's]
     #[arg(long, value_name = "STEPS", value_parser = clap::value_parser!(u32).range(1..=20_000))]

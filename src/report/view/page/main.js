@@ -88,7 +88,7 @@ function chips() {
     const more = make("button", { className: "more", title: shown ? "Take out" : "Put beside" }, shown ? "\u2212" : "+");
     more.setAttribute("aria-label", `${more.title}: ${episode.name}`);
     more.addEventListener("click", () => toggle(episode.number));
-    chip.append(name, more);
+    chip.append(name, ...(shown && !several ? [] : [more]));
     return chip;
   }));
   by("chips").hidden = episodes.length === 1;
