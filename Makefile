@@ -123,7 +123,7 @@ POLICY     := $(DIR)/policy$(OF).safetensors
 EVALUATION := $(DIR)/evaluation$(OF).json
 ARTEFACTS  := $(PLANS) $(RECORDINGS) $(DATASET) $(DYNAMICS) $(POLICY) $(EVALUATION)
 
-.PHONY: all stages smoke experiment table2 table3 figures report test cluster-test check transfer meta-world interop report-test qemu bench fuzz help clean-runs build install need-cargo FORCE $(ARTEFACTS)
+.PHONY: all stages smoke experiment table2 table3 figures report test cluster-test check transfer meta-world interop report-test view-test qemu bench fuzz help clean-runs build install need-cargo FORCE $(ARTEFACTS)
 
 all: $(EVALUATION) ## run every stage of TASK; writes RUNS/TASK/policy.safetensors and RUNS/TASK/evaluation.json
 	@$(MADE) result
@@ -282,6 +282,11 @@ interop: build ## tiny runs of all tasks, read by mcap, pyarrow, DuckDB, pandas,
 
 report-test: report ## open that page in headless Chromium: no network, no errors, every figure (needs Python 3; installs Playwright and Chromium)
 	tests/report/browser.sh $(RUNS)/report
+
+view-test: build ## play a page of hilt view in headless Chromium and compare its poses with the recordings (as report-test)
+	$(HILT) evaluate --task $(TASK) --policy planner --episodes 4 --record $(RUNS)/view-test/recordings
+	$(HILT) view $(RUNS)/view-test/recordings --no-open --out $(RUNS)/view-test/page.html
+	tests/report/browser.sh $(RUNS)/view-test/page.html $(RUNS)/view-test/recordings/*.mcap
 
 qemu: build ## the same bytes as processors with and without FMA, all kernels, another libm (needs qemu-user and cc; minutes)
 	tests/qemu.sh

@@ -3,7 +3,7 @@
 use assert_cmd::Command;
 use std::fs;
 
-const STAGES: [&str; 15] = [
+const STAGES: [&str; 17] = [
     "plan",
     "simulate",
     "convert",
@@ -14,7 +14,9 @@ const STAGES: [&str; 15] = [
     "runs",
     "compare",
     "plot",
+    "view",
     "render",
+    "replay",
     "settings",
     "export",
     "serve",

@@ -3,8 +3,8 @@
 use super::console::Console;
 use super::context::{Context, Outcome};
 use super::{
-    compare, completions, convert, dataset, doctor, evaluate, experiment, export, inspect, man, plan, plot, pretrain, render, report, robot, runs,
-    serve, serve_env, settings, simulate, train,
+    compare, completions, convert, dataset, doctor, evaluate, experiment, export, inspect, man, plan, plot, pretrain, render,
+    replay, report, robot, runs, serve, serve_env, settings, simulate, train, view,
 };
 use crate::error::{Error, Result};
 use crate::interrupt::Interrupt;
@@ -55,7 +55,9 @@ enum Command {
     Compare(compare::Args),
     Plot(plot::Args),
     Dataset(dataset::Args),
+    View(view::Args),
     Render(render::Args),
+    Replay(replay::Args),
     Settings(settings::Args),
     Experiment(experiment::Args),
     Report(report::Args),
@@ -101,7 +103,9 @@ impl Cli {
             Command::Runs(args) => return runs::run(args, &context),
             Command::Compare(args) => return compare::run(args, &context),
             Command::Plot(args) => return plot::run(args, &context),
+            Command::View(args) => view::run(args, &context),
             Command::Render(args) => render::run(args, &context),
+            Command::Replay(args) => replay::run(args, &context),
             Command::Robot(args) => return robot::run(args, &context),
             Command::Settings(args) => return settings::run(args, &context),
             Command::Doctor(args) => return doctor::run(args, &context),

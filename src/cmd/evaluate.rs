@@ -1,4 +1,5 @@
 use super::common::{SettingsArgs, path_or};
+use super::page::{PageArgs, atlas, title_of};
 use super::places::{Content, Places, beside};
 use super::subject::{Chosen, ServedArgs, Subject};
 use super::{Console, Context, Outcome, output};
@@ -15,6 +16,7 @@ use crate::scene::Scene;
 use serde::Serialize;
 use serde_json::Value;
 use std::collections::BTreeMap;
+use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 
 /// Run a policy on seeded episodes that no demonstration used: success with its 95 % interval, conditions, failure classes.
@@ -46,6 +48,10 @@ pub struct Args {
     /// Record every episode as MCAP into this directory
     #[arg(long, value_name = "DIR")]
     record: Option<PathBuf>,
+    /// With --record: write a page beside that directory, DIR.html, with how the episodes end, where they start, and of each way to end the first N to
+    /// look at
+    #[arg(long, value_name = "N", requires = "record", value_parser = clap::value_parser!(u32).range(1..=16))]
+    render: Option<u32>,
 }
 
 pub fn run(args: &Args, context: &Context) -> Result<Outcome> {
@@ -70,6 +76,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome> {
         None => run_all(&rollouts, &subject, context, |_| Ok(()))?,
         Some(dir) => record_all(dir, &rollouts, &subject, context, &provenance)?,
     };
+    write_atlas(args, context)?;
     let summary = Summary::of(&pipeline.task, &trials);
     let stated = Stated::new(&summary, &foreign);
     if let (Some(out), Some(log)) = (&args.out, log) {
@@ -92,11 +99,30 @@ impl Args {
             places = places.write("--out", out, Content::Summary("evaluate"));
             places = places.write("the log of the episodes", log, Content::Table("evaluate"));
         }
+        if let Some(page) = self.atlas_page() {
+            places = places.write("the page beside --record", &page, Content::Page);
+        }
         match &self.record {
             Some(dir) => places.write("--record", dir, Content::Recordings("evaluate")),
             None => places,
         }
     }
+
+    /// Where the page of --render goes.
+    fn atlas_page(&self) -> Option<PathBuf> {
+        let dir = self.render.and(self.record.as_deref())?;
+        let name = dir.file_name().unwrap_or(OsStr::new("episodes")).to_string_lossy();
+        Some(dir.with_file_name(format!("{name}.html")))
+    }
+}
+
+/// The page of --render.
+fn write_atlas(args: &Args, context: &Context) -> Result<()> {
+    let (Some(page), Some(dir), Some(most)) = (args.atlas_page(), &args.record, args.render) else { return Ok(()) };
+    let text = atlas(&title_of(std::slice::from_ref(dir)), dir, most as usize, &PageArgs::default(), context)?;
+    atomic::write_bytes(&page, text.as_bytes())?;
+    context.console.say(&format!("evaluate: wrote {}", page.display()));
+    Ok(())
 }
 
 /// Sections of the settings that make an episode what it is.

@@ -39,6 +39,10 @@ pub enum Content {
     Live,
     /// A directory of TensorBoard's event files.
     Events,
+    /// A page to look at episodes.
+    Page,
+    /// A recording of this stage.
+    Recording(&'static str),
     /// A directory of recordings of this stage.
     Recordings(&'static str),
     /// A directory with the two datasets.
@@ -56,7 +60,7 @@ pub enum Content {
 }
 
 /// Endings of other formats; what follows another dot belongs to a name (policy-0.1).
-const ENDINGS: [&str; 17] = [
+const ENDINGS: [&str; 18] = [
     "parquet",
     "safetensors",
     "onnx",
@@ -65,6 +69,7 @@ const ENDINGS: [&str; 17] = [
     "jsonl",
     "png",
     "gif",
+    "html",
     "svg",
     "log",
     "mcap",
@@ -207,6 +212,8 @@ fn check_ending(name: &str, path: &Path, content: Content) -> Result<()> {
         Content::Svg => ("svg", "an SVG picture"),
         Content::Csv => ("csv", "a CSV file"),
         Content::Live => (live_file::ENDING, "a file with a line of JSON an epoch"),
+        Content::Page => ("html", "a page"),
+        Content::Recording(_) => ("mcap", "a recording"),
         Content::Log => ("log", "a log"),
         Content::Recordings(_)
         | Content::Datasets
@@ -235,6 +242,8 @@ fn check_held(name: &str, path: &Path, content: Content) -> Result<()> {
         Content::Urdf | Content::Man => (Format::Marked, None, None),
         Content::Png => (Format::Png, None, None),
         Content::Gif => (Format::Gif, None, None),
+        Content::Page => (Format::Html, Some("view"), None),
+        Content::Recording(stage) => (Format::Mcap, Some(stage), None),
         Content::Log | Content::Report | Content::Pieces | Content::Own | Content::Events => return Ok(()),
         Content::Svg | Content::Csv | Content::Live => return check_text(name, path, content),
         Content::Datasets | Content::Dataset => return check_dataset(name, path),

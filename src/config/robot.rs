@@ -55,6 +55,12 @@ pub fn is_file(said: &str) -> bool {
     Path::new(said).extension().is_some_and(|ending| ending == ENDING)
 }
 
+impl From<Arc<Robot>> for ChosenRobot {
+    fn from(robot: Arc<Robot>) -> Self {
+        ChosenRobot { said: robot.name.clone(), robot }
+    }
+}
+
 impl Default for ChosenRobot {
     /// The paper's arm.
     fn default() -> Self {

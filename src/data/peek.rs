@@ -27,6 +27,10 @@ const ONNX_VERSION: u8 = 0x08;
 const ONNX_PRODUCER: u8 = 0x12;
 /// Bytes of a field's key and of the number that follows, at most.
 const LONGEST_KEY: u64 = 20;
+/// How a page begins, and what stands in its first bytes before the stage of hilt that made it.
+const DOCTYPE: &[u8] = b"<!DOCTYPE html>";
+const GENERATOR: &[u8] = b"<meta name=\"generator\" content=\"hilt ";
+const PAGE_HEAD: u64 = 512;
 /// The stage comes within so many bytes after the version.
 const NEAR: usize = 64;
 
@@ -51,6 +55,8 @@ pub enum Format {
     Onnx,
     /// A text that hilt wrote for other programs.
     Marked,
+    /// An HTML page.
+    Html,
     /// None of these.
     Other,
 }
@@ -83,6 +89,7 @@ pub fn peek(path: &Path) -> Result<Peeked> {
         Format::Mcap => in_tail(&mut file, size, mcap::MAGIC, format)?,
         Format::Safetensors => in_header(&mut file, size, &head)?,
         Format::Onnx => in_fields(&mut file, size, &head)?,
+        Format::Html => in_page(&part(&mut file, 0, PAGE_HEAD)?),
         Format::Json if size <= LONGEST_JSON => in_json(&part(&mut file, 0, size)?),
         _ => plain,
     })
@@ -99,10 +106,20 @@ pub(super) fn format_of(head: &[u8]) -> Format {
         [_, _, _, _, _, 0, 0, 0, b'{', ..] => Format::Safetensors,
         // Two numbers of the beginning of every ONNX file: its version's field and its producer's.
         [ONNX_VERSION, _, ONNX_PRODUCER, ..] => Format::Onnx,
+        _ if head.starts_with(DOCTYPE) => Format::Html,
         _ if head.starts_with(mcap::MAGIC) => Format::Mcap,
         _ if marked::is_ours(head) => Format::Marked,
         _ => Format::Other,
     }
+}
+
+/// Of a page: the stage of hilt that says to have made it.
+fn in_page(head: &[u8]) -> Peeked {
+    let stage = find_first(head, GENERATOR).map(|at| {
+        let rest = &head[at + GENERATOR.len()..];
+        rest.iter().take_while(|b| b.is_ascii_lowercase()).map(|b| char::from(*b)).collect()
+    });
+    Peeked { format: Format::Html, stage, kind: None, whole: true }
 }
 
 /// Of a table or a recording: the provenance's own text near the end.

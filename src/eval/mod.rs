@@ -7,12 +7,14 @@
 mod difference;
 mod log;
 mod policy;
+mod replay;
 mod summary;
 mod wilson;
 
 pub use difference::{Pairs, newcombe_95};
 pub use log::to_table;
 pub use policy::PolicyController;
+pub use replay::{Moment, Replay};
 pub use summary::{Percentiles, Summary};
 pub use wilson::wilson_95;
 

@@ -11,3 +11,4 @@ pub mod render;
 pub mod runs;
 pub mod statistics;
 pub mod table;
+pub mod view;

@@ -40,16 +40,40 @@ pub fn run_episode(
     interrupt: &Interrupt,
 ) -> Result<Episode> {
     let mut run = Run::new(scene);
-    let end = guarded(|| run.until_the_end(controller, disturbance, max_steps, interrupt)).unwrap_or(Ok(End::BrokenDown))?;
-    let success = end == End::Regular && run.verdict.success;
-    let failure = match end {
-        End::Regular => (!success).then(|| run.monitor.classify(&run.seen)),
-        End::NoCommand => Some(FailureClass::CommandNotFinite),
-        End::BrokenDown => Some(FailureClass::SimulationBrokeDown),
+    let whole = || match run.begin() {
+        Some(mut world) => run.until_the_end(&mut world, controller, disturbance, max_steps, interrupt),
+        None => Ok(End::BrokenDown),
     };
-    let still = Joints::zeros(scene.robot.joints.len());
-    let last = record(&run.seen, &run.verdict, still, still, None);
-    Ok(Episode { index, scene: scene.clone(), steps: run.steps, last, success, failure })
+    let end = guarded(whole).unwrap_or(Ok(End::BrokenDown))?;
+    Ok(run.finished(index, end))
+}
+
+/// Runs a recorded episode again up to step `at`, by the commands that the motors were given, and from there as [`run_episode`] does with another
+/// controller and another disturbance (whose first `at` steps are let pass). The physics depends on nothing else: joints, objects, their velocities and the
+/// forces between them are those of the recorded moment, to the bit where the recording is of this version's physics. Returns how far they are from what was
+/// recorded, too: the largest difference of a joint \[rad, m\] or of an object's place \[m\] on the way.
+///
+/// # Errors
+/// [`crate::error::Error::Interrupted`], within a step.
+pub fn run_episode_from(
+    recorded: &Episode,
+    at: usize,
+    controller: &mut dyn Controller,
+    disturbance: &mut Disturbance,
+    max_steps: u32,
+    interrupt: &Interrupt,
+) -> Result<(Episode, f64)> {
+    let (mut run, mut apart) = (Run::new(&recorded.scene), 0.0);
+    let whole = || {
+        let Some(mut world) = run.begin() else { return Ok(End::BrokenDown) };
+        match run.repeat(&mut world, recorded, at, disturbance, interrupt)? {
+            Some(found) => apart = found,
+            None => return Ok(End::BrokenDown),
+        }
+        run.until_the_end(&mut world, controller, disturbance, max_steps, interrupt)
+    };
+    let end = guarded(whole).unwrap_or(Ok(End::BrokenDown))?;
+    Ok((run.finished(recorded.index, end), apart))
 }
 
 /// How an episode ended.
@@ -79,19 +103,51 @@ impl<'a> Run<'a> {
         Run { scene, monitor: Monitor::new(scene), steps: Vec::new(), seen: at_rest(scene), verdict }
     }
 
+    /// The world at its start; `None` when its numbers are none.
+    fn begin(&mut self) -> Option<World> {
+        let mut world = World::new(self.scene);
+        let first = world.observe();
+        sound(&first).then(|| self.see(first))?;
+        Some(world)
+    }
+
+    /// Goes through the first `steps` of a recorded episode; how far from it, `None` when the simulation breaks down.
+    fn repeat(
+        &mut self,
+        world: &mut World,
+        recorded: &Episode,
+        steps: usize,
+        disturbance: &mut Disturbance,
+        interrupt: &Interrupt,
+    ) -> Result<Option<f64>> {
+        let mut apart = apart(&self.seen, recorded.steps.first().unwrap_or(&recorded.last));
+        for (t, step) in recorded.steps.iter().take(steps).enumerate() {
+            interrupt.check()?;
+            disturbance.apply(&step.commanded);
+            world.step(&step.executed);
+            let next = world.observe();
+            if !sound(&next) {
+                return Ok(None);
+            }
+            self.steps.push(record(&self.seen, &self.verdict, step.commanded, step.executed, step.phase));
+            self.see(next);
+            apart = self.apart_from(recorded, t + 1).max(apart);
+        }
+        Ok(Some(apart))
+    }
+
+    fn apart_from(&self, recorded: &Episode, t: usize) -> f64 {
+        apart(&self.seen, recorded.steps.get(t).unwrap_or(&recorded.last))
+    }
+
     fn until_the_end(
         &mut self,
+        world: &mut World,
         controller: &mut dyn Controller,
         disturbance: &mut Disturbance,
         max_steps: u32,
         interrupt: &Interrupt,
     ) -> Result<End> {
-        let mut world = World::new(self.scene);
-        let first = world.observe();
-        if !sound(&first) {
-            return Ok(End::BrokenDown);
-        }
-        self.see(first);
         while !self.verdict.success && self.steps.len() < max_steps as usize && !fallen(&self.seen.objects) {
             interrupt.check()?;
             controller.judged(&self.verdict);
@@ -115,6 +171,29 @@ impl<'a> Run<'a> {
         self.verdict = self.monitor.update(&next);
         self.seen = next;
     }
+
+    /// What is recorded of it.
+    fn finished(self, index: u64, end: End) -> Episode {
+        let success = end == End::Regular && self.verdict.success;
+        let failure = match end {
+            End::Regular => (!success).then(|| self.monitor.classify(&self.seen)),
+            End::NoCommand => Some(FailureClass::CommandNotFinite),
+            End::BrokenDown => Some(FailureClass::SimulationBrokeDown),
+        };
+        let still = Joints::zeros(self.scene.robot.joints.len());
+        let last = record(&self.seen, &self.verdict, still, still, None);
+        Episode { index, scene: self.scene.clone(), steps: self.steps, last, success, failure }
+    }
+}
+
+/// The largest difference of a joint \[rad, m\] or of an object's place \[m\].
+fn apart(seen: &Observation, recorded: &Step) -> f64 {
+    let joints = seen.state.q.iter().zip(&recorded.state.q).map(|(a, b)| a - b);
+    let places = seen.objects.iter().zip(&recorded.objects).flat_map(|(a, b)| {
+        let (a, b) = (a.pose.position_m, b.pose.position_m);
+        (0..3).map(move |i| a[i] - b[i])
+    });
+    joints.chain(places).fold(0.0, |most, difference| most.max(difference.abs()))
 }
 
 /// What there is to see before the first contact is known: the arm in its ready pose, the objects where the scene has them.

@@ -16,7 +16,7 @@ mod world;
 
 pub use disturbance::Disturbance;
 pub use env::TaskEnv;
-pub use episode::{Controller, fallen, run_episode};
+pub use episode::{Controller, fallen, run_episode, run_episode_from};
 pub use follower::Follower;
 pub use physics::{Grain, Physics};
 pub use replay::reexecute;

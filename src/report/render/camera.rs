@@ -3,13 +3,13 @@
 use nalgebra::Vector3;
 
 /// Where the camera stands \[m\]: in front of the table, to the arm's right, so that neither hand nor arm hides the block.
-const EYE_M: [f32; 3] = [1.38, -1.10, 0.86];
+pub const EYE_M: [f32; 3] = [1.38, -1.10, 0.86];
 /// What it looks at \[m\].
-const LOOK_AT_M: [f32; 3] = [0.27, 0.04, 0.255];
+pub const LOOK_AT_M: [f32; 3] = [0.27, 0.04, 0.255];
 /// Height of the view at unit distance, for pictures that are at least 4:3 wide (a vertical angle of 33 degrees).
-const VIEW_HEIGHT: f32 = 0.585;
+pub const VIEW_HEIGHT: f32 = 0.585;
 /// Aspect the view is made for; a narrower picture shows the same width.
-const ASPECT: f32 = 4.0 / 3.0;
+pub const ASPECT: f32 = 4.0 / 3.0;
 /// Points nearer than this are not drawn \[m\].
 const NEAREST_M: f32 = 0.05;
 

@@ -1,6 +1,7 @@
 //! The colours of everything, and the fixed palette of animated pictures.
 
 use super::raster::Rgb;
+use crate::task::Task;
 
 /// Behind everything.
 pub const BACKGROUND: Rgb = [246, 247, 249];
@@ -22,6 +23,12 @@ pub const GOOD: Rgb = [20, 128, 62];
 pub const BAD: Rgb = [196, 44, 44];
 /// The arm, from base to fingers: neighbours differ so that joints can be told apart.
 const ARM: [Rgb; 4] = [[82, 90, 108], [150, 160, 176], [108, 118, 136], [86, 96, 118]];
+
+/// Colour of an object of a task.
+pub fn of_object(task: &Task, object: usize) -> Rgb {
+    if object < task.moved() { MOVED[object % MOVED.len()] } else { BASE }
+}
+
 /// Colour of a link of a robot, whose arm has so many joints.
 pub fn of_link(link: usize, arm: usize) -> Rgb {
     match link {

@@ -6,10 +6,24 @@ use crate::task;
 use nalgebra::{Isometry3, Rotation3, Vector3};
 use std::f64::consts::{FRAC_PI_2, TAU};
 
-/// Corners around a capsule: round enough that its outline shows no edges at README size.
-const AROUND: usize = 20;
-/// Rings of a capsule's half sphere.
-const RINGS: usize = 5;
+/// How round what is round is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Detail {
+    /// Corners around a capsule.
+    pub around: usize,
+    /// Rings of its half sphere.
+    pub rings: usize,
+}
+
+impl Detail {
+    /// Round enough that an outline shows no edges at README size.
+    pub const FINE: Detail = Detail { around: 20, rings: 5 };
+    /// Half of the triangles: a page draws them sixty times a second, on some machines without a graphics processor.
+    pub const LIGHT: Detail = Detail { around: 16, rings: 3 };
+}
+
+/// Corners around a cylinder.
+const AROUND: usize = Detail::FINE.around;
 
 /// A point of a surface with its outward normal.
 #[derive(Clone, Copy, Debug)]
@@ -31,11 +45,11 @@ pub struct Mesh {
 
 impl Mesh {
     /// The surface of a collision primitive, and where it is in its link's frame.
-    pub fn of_shape(shape: &Shape) -> (Self, Isometry3<f64>) {
+    pub fn of_shape(shape: &Shape, detail: Detail) -> (Self, Isometry3<f64>) {
         match *shape {
             Shape::Box { pose, half_m } => (Mesh::cuboid([0.0; 3], half_m), pose),
             Shape::Capsule { from_m, to_m, radius_m } => {
-                (Mesh::capsule(from_m.into(), to_m.into(), radius_m), Isometry3::identity())
+                (Mesh::capsule(from_m.into(), to_m.into(), radius_m, detail), Isometry3::identity())
             }
         }
     }
@@ -99,28 +113,28 @@ impl Mesh {
     }
 
     /// A segment with a radius \[m\]: rings of corners from the pole behind `from` to the pole beyond `to`.
-    pub fn capsule(from: Vector3<f64>, to: Vector3<f64>, radius: f64) -> Self {
+    pub fn capsule(from: Vector3<f64>, to: Vector3<f64>, radius: f64, Detail { around, rings }: Detail) -> Self {
         let axis = to - from;
         // Any turn that brings z onto the axis will do; a half turn about x is the one for an axis along -z.
         let turn = Rotation3::rotation_between(&Vector3::z(), &axis)
             .unwrap_or_else(|| Rotation3::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI));
         let mut mesh = Mesh::default();
-        let rows = 2 * (RINGS + 1);
+        let rows = 2 * (rings + 1);
         for row in 0..rows {
-            let far = row > RINGS;
-            let step = if far { row - RINGS - 1 } else { row };
-            let elevation = FRAC_PI_2 * (step as f64 / RINGS as f64 - if far { 0.0 } else { 1.0 });
+            let far = row > rings;
+            let step = if far { row - rings - 1 } else { row };
+            let elevation = FRAC_PI_2 * (step as f64 / rings as f64 - if far { 0.0 } else { 1.0 });
             let (up, out) = sin_cos(elevation);
-            for k in 0..AROUND {
-                let (sin, cos) = sin_cos(TAU * k as f64 / AROUND as f64);
+            for k in 0..around {
+                let (sin, cos) = sin_cos(TAU * k as f64 / around as f64);
                 let normal = turn * Vector3::new(out * cos, out * sin, up);
                 let at = if far { to } else { from } + normal * radius;
                 mesh.vertices.push(Vertex { at: at.cast(), normal: normal.cast() });
             }
         }
         for row in 0..rows - 1 {
-            for k in 0..AROUND {
-                let index = |row: usize, k: usize| (row * AROUND + k % AROUND) as u32;
+            for k in 0..around {
+                let index = |row: usize, k: usize| (row * around + k % around) as u32;
                 let (a, b, c, d) = (index(row, k), index(row, k + 1), index(row + 1, k + 1), index(row + 1, k));
                 mesh.triangles.extend([[a, b, c], [a, c, d]]);
             }
@@ -176,7 +190,7 @@ mod tests {
         assert!((box_volume - 0.048).abs() < 1e-5, "{box_volume}");
         let exact = std::f32::consts::PI * 0.01 * (0.4 + 4.0 / 3.0 * 0.1);
         for to in [[0.0, 0.0, 0.4], [0.0, 0.0, -0.4], [0.4, 0.0, 0.0]] {
-            let share = volume(&Mesh::capsule(Vector3::zeros(), to.into(), 0.1)) / exact;
+            let share = volume(&Mesh::capsule(Vector3::zeros(), to.into(), 0.1, Detail::FINE)) / exact;
             assert!((0.95..1.0).contains(&share), "{to:?}: {share} of the exact volume");
         }
     }

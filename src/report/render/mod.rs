@@ -1,18 +1,19 @@
 //! Pictures of episodes by a small software rasteriser: the same bytes on every run, no GPU, no window.
 
-mod camera;
-mod colors;
+pub(in crate::report) mod camera;
+pub(in crate::report) mod colors;
 mod font;
 mod gif;
-mod links;
-mod mesh;
-mod raster;
+pub(in crate::report) mod links;
+pub(in crate::report) mod mesh;
+pub(in crate::report) mod raster;
 mod robot;
 mod shadow;
 mod sheet;
 
 pub use self::gif::{GifOptions, write_gif};
 pub use self::robot::robot_png;
+pub(in crate::report) use sheet::write_png;
 pub use sheet::write_png_sheet;
 
 use crate::demo::{Body, Episode, Step};
@@ -20,7 +21,7 @@ use crate::error::{Error, Result};
 use crate::robot::Robot;
 use crate::scene::Scene;
 use camera::Camera;
-use mesh::Mesh;
+use mesh::{Detail, Mesh};
 use nalgebra::{Isometry3, Translation3};
 use raster::{Area, Paint, Rgb, Samples};
 use std::sync::Arc;
@@ -28,9 +29,9 @@ use std::sync::Arc;
 /// Samples along each edge of a pixel: 2 x 2 of them make its colour.
 const SUPERSAMPLING: usize = 2;
 /// The table's edges: x low and high, y low and high \[m\]. Wide enough for every default spawn area and the arm's foot.
-const TABLE_M: [[f64; 2]; 2] = [[-0.14, 0.72], [-0.30, 0.40]];
+pub(in crate::report) const TABLE_M: [[f64; 2]; 2] = [[-0.14, 0.72], [-0.30, 0.40]];
 /// Thickness of the table \[m\].
-const TABLE_THICKNESS_M: f64 = 0.03;
+pub(in crate::report) const TABLE_THICKNESS_M: f64 = 0.03;
 /// The table's upper layer, which takes shadows \[m\].
 const TOP_LAYER_M: f64 = 0.001;
 /// Half thickness of the bars around the target \[m\].
@@ -38,7 +39,7 @@ const MARKER_HALF_BAR_M: f64 = 0.0012;
 /// Room between a block that stands exactly on the target and the marker's faces \[m\].
 const MARKER_ROOM_M: f64 = 0.003;
 /// Opacity of the marker's faces.
-const MARKER_OPACITY: f32 = 0.18;
+pub(in crate::report) const MARKER_OPACITY: f32 = 0.18;
 /// Tag of the samples that take shadows.
 const TAG_TABLE: u8 = 1;
 /// Smallest and largest picture edge that writers accept \[pixels\].
@@ -112,14 +113,9 @@ impl Renderer {
         let mut plain = RgbImage { width: size.0, height: size.1, data: vec![0; width * height * 3] };
         resolve(&canvas, Area::all(width, height), &mut plain);
         let task = &scene.task;
-        let color = |i: usize| if i < task.moved() { colors::MOVED[i % colors::MOVED.len()] } else { colors::BASE };
-        let objects = task.objects.iter().enumerate().map(|(i, object)| (Mesh::of_object(&object.shape), color(i)));
-        let (mut marker_bars, mut marker_faces) = (Mesh::default(), Mesh::default());
-        for (goal, of) in task.goals.iter().enumerate() {
-            let around = task.objects[of.object].shape.half_m().map(|half| half + MARKER_ROOM_M);
-            marker_bars.append(&Mesh::frame(scene.target_m(goal), around, MARKER_HALF_BAR_M));
-            marker_faces.append(&Mesh::cuboid(scene.target_m(goal), around));
-        }
+        let objects =
+            task.objects.iter().enumerate().map(|(i, object)| (Mesh::of_object(&object.shape), colors::of_object(task, i)));
+        let [marker_bars, marker_faces] = marker(scene);
         Renderer {
             size,
             pixels: Camera::new(width, height),
@@ -127,9 +123,9 @@ impl Renderer {
             canvas,
             samples,
             robot: Arc::clone(&scene.robot),
-            links: links::of_robot(&scene.robot),
+            links: links::of_robot(&scene.robot, Detail::FINE),
             objects: objects.collect(),
-            obstacles: scene.obstacles.iter().map(|o| Mesh::cuboid(o.center_m, o.size_m.map(|v| v / 2.0))).collect(),
+            obstacles: obstacles(scene).collect(),
             marker_bars,
             marker_faces,
         }
@@ -157,6 +153,22 @@ impl Renderer {
         solids.extend(self.obstacles.iter().map(|mesh| (mesh, Isometry3::identity(), colors::OBSTACLE)));
         solids
     }
+}
+
+/// What shows where objects are to be: bars along the edges, and faces between them to be seen through.
+pub(in crate::report) fn marker(scene: &Scene) -> [Mesh; 2] {
+    let (mut bars, mut faces) = (Mesh::default(), Mesh::default());
+    for (goal, of) in scene.task.goals.iter().enumerate() {
+        let around = scene.task.objects[of.object].shape.half_m().map(|half| half + MARKER_ROOM_M);
+        bars.append(&Mesh::frame(scene.target_m(goal), around, MARKER_HALF_BAR_M));
+        faces.append(&Mesh::cuboid(scene.target_m(goal), around));
+    }
+    [bars, faces]
+}
+
+/// Boxes to keep clear of.
+pub(in crate::report) fn obstacles(scene: &Scene) -> impl Iterator<Item = Mesh> {
+    scene.obstacles.iter().map(|o| Mesh::cuboid(o.center_m, o.size_m.map(|v| v / 2.0)))
 }
 
 /// Draws what stands on the table, with its shadows: mesh, where it is, colour. The cameras are those of samples and pixels.

@@ -2,6 +2,7 @@
 
 use super::camera::Camera;
 use super::links;
+use super::mesh::Detail;
 use super::raster::{Area, Samples};
 use super::{RgbImage, SUPERSAMPLING, check_size, colors, draw_solids, font, resolve, table};
 use crate::error::{Error, Result};
@@ -30,7 +31,7 @@ fn picture(robot: &Robot, q: &[f64], size: (u32, u32)) -> RgbImage {
     let (samples, pixels) = (Camera::new(width * SUPERSAMPLING, height * SUPERSAMPLING), Camera::new(width, height));
     let mut canvas: Samples = table(&samples, width * SUPERSAMPLING, height * SUPERSAMPLING);
     let poses = robot.link_poses(q);
-    let meshes = links::of_robot(robot);
+    let meshes = links::of_robot(robot, Detail::FINE);
     let solids: Vec<_> = meshes.iter().map(|(link, mesh, local, rgb)| (mesh, poses[*link] * local, *rgb)).collect();
     draw_solids(&mut canvas, [&samples, &pixels], size, &solids);
     let mut picture = RgbImage { width: size.0, height: size.1, data: vec![0; width * height * 3] };

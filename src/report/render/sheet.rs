@@ -68,7 +68,7 @@ pub(super) fn paste(sheet: &mut RgbImage, picture: &RgbImage, left: u32, top: u3
 }
 
 /// As a PNG file.
-pub(super) fn write_png<W: Write>(image: &RgbImage, out: W) -> std::result::Result<(), png::EncodingError> {
+pub(in crate::report) fn write_png<W: Write>(image: &RgbImage, out: W) -> std::result::Result<(), png::EncodingError> {
     let mut encoder = png::Encoder::new(out, image.width, image.height);
     encoder.set_color(png::ColorType::Rgb);
     encoder.set_depth(png::BitDepth::Eight);
