@@ -3,7 +3,7 @@
 use assert_cmd::Command;
 use std::fs;
 
-const STAGES: [&str; 17] = [
+const STAGES: [&str; 20] = [
     "plan",
     "simulate",
     "convert",

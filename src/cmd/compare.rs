@@ -10,9 +10,8 @@ use std::str::FromStr;
 ///
 /// Episodes are pairs where task, seed and start are the same: then McNemar's exact test and Newcombe's interval for pairs tell the policies apart, and
 /// every episode that ended otherwise is named. Two directories with several seeds each are paired by seed.
-///
-/// Example: hilt compare runs/stack:hil runs/stack:bc
 #[derive(Debug, clap::Args)]
+#[command(after_help = "Example:\n  hilt compare evaluation.json evaluation-bc.json")]
 pub struct Args {
     /// Run, evaluation.json, table of its episodes, or a directory of runs; :hil or another method after a directory picks that
     #[arg(value_name = "RUN|FILE|DIR[:METHOD]")]

@@ -59,9 +59,8 @@ struct UrdfArgs {
 }
 
 /// A table, a recording or a dataset as CSV: a row a row, a step or a frame; the first line names the columns with their units.
-///
-/// Example: hilt export csv runs/stack/evaluation.episodes.parquet > episodes.csv
 #[derive(Debug, clap::Args)]
+#[command(after_help = "Example:\n  hilt export csv evaluation.episodes.parquet > episodes.csv")]
 struct CsvArgs {
     /// Table (plans, metrics, episodes), recording, or dataset (runs/stack/dataset/train)
     #[arg(value_name = "FILE.parquet|FILE.mcap|DIR")]
@@ -74,9 +73,8 @@ struct CsvArgs {
 /// Metrics of trainings as event files of TensorBoard's: tensorboard --logdir DIR shows them.
 ///
 /// A step is an epoch, counted over all stages. The same metrics give the same bytes: where an event has a time it has the step.
-///
-/// Example: hilt export tensorboard runs/stack --out board
 #[derive(Debug, clap::Args)]
+#[command(after_help = "Example:\n  hilt export tensorboard policy.training.parquet --out board")]
 struct TensorboardArgs {
     /// Runs, or tables of metrics (policy.training.parquet, dynamics.pretraining.parquet)
     #[arg(value_name = "RUN|FILE.parquet", required = true)]

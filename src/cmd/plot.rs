@@ -13,9 +13,8 @@ use std::time::{Duration, SystemTime};
 ///
 /// Each stage of training is as wide as the next. --watch draws again whenever a training has written more (hilt train --live, make all LIVE=1) and ends
 /// with it.
-///
-/// Example: hilt plot runs/stack --metric d_conv --metric alpha
 #[derive(Debug, clap::Args)]
+#[command(after_help = "Example:\n  hilt plot policy.training.parquet --metric d_conv --metric alpha")]
 pub struct Args {
     /// Runs, tables of metrics (policy.training.parquet, dynamics.pretraining.parquet), or what hilt train --live writes
     #[arg(value_name = "RUN|FILE", required = true)]

@@ -8,11 +8,9 @@ use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 
 /// Draw a recorded episode: an animated GIF, or a contact sheet as PNG; or episodes as a page to turn and play.
-///
-/// Example: hilt render rollouts/episode-00000.mcap --gif
 #[derive(Debug, clap::Args)]
 #[command(
-    after_help = "Examples:\n  hilt render rollouts/episode-00000.mcap --out episode.gif\n  hilt render rollouts/episode-00000.mcap --png --columns 5 --rows 2"
+    after_help = "Examples:\n  hilt render rollouts/episode-00000.mcap --out episode.gif\n  hilt render rollouts/episode-00000.mcap --png --columns 5 --rows 2\n  hilt render rollouts/episode-00000.mcap --out page.html"
 )]
 pub struct Args {
     /// Recording; for a page several, directories of them or runs

@@ -18,9 +18,8 @@ use std::path::{Path, PathBuf};
 /// The recording's commands are executed again up to the moment: joints, objects, their velocities and the forces between them are what they were, to
 /// the bit; what is not is said. With the policy and the seed of the recording the rest is the recording's, too. A sampled action, a policy that is
 /// served and the planner begin anew at the moment. The planner begins with an open hand: not while the fingers hold something.
-///
-/// Example: hilt replay --from rollouts/episode-00003.mcap --at 2.5 --policy planner
 #[derive(Debug, clap::Args)]
+#[command(after_help = "Example:\n  hilt replay --from rollouts/episode-00000.mcap --at 1.5 --policy policy-bc.safetensors")]
 pub struct Args {
     /// Recording to begin from
     #[arg(long, value_name = "FILE.mcap")]

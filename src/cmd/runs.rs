@@ -5,9 +5,8 @@ use crate::report::runs::{list, list_json, list_text};
 use std::path::PathBuf;
 
 /// List the runs below a directory: success, method, demos, time, and the settings in which they differ, the best of each task first.
-///
-/// Example: hilt runs runs
 #[derive(Debug, clap::Args)]
+#[command(after_help = "Example:\n  hilt runs .")]
 pub struct Args {
     /// Directory with runs in it, at any depth: runs, runs/experiments/table3
     #[arg(value_name = "DIR", default_value = super::common::RUNS)]

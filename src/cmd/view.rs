@@ -8,9 +8,10 @@ use std::process::{Command, Stdio};
 ///
 /// Opens the page if there is a browser, else prints where it is. Several recordings, or several directories with the same --episodes, are shown side by side or
 /// in one picture: the same start for two methods and the planner.
-///
-/// Example: hilt view rollouts/episode-00000.mcap
 #[derive(Debug, clap::Args)]
+#[command(
+    after_help = "Examples:\n  hilt view rollouts/episode-00000.mcap --no-open\n  hilt view rollouts recordings --episodes 0,1 --out both.html --no-open"
+)]
 pub struct Args {
     /// Recordings, directories of them, or runs, whose recordings are taken
     #[arg(value_name = "FILE.mcap|DIR|RUN", required = true)]
