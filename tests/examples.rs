@@ -91,6 +91,9 @@ fn the_examples_of_every_help_run() {
     found.sort_by_key(|(name, _)| name == "report");
     let dir = tempfile::tempdir().expect("a directory");
     std::fs::write(dir.path().join("observations.jsonl"), "").expect("written");
+    // The experiments that a clone of the repository brings along.
+    let pipelines = Path::new(env!("CARGO_MANIFEST_DIR")).join("pipelines");
+    std::os::unix::fs::symlink(pipelines, dir.path().join("pipelines")).expect("linked");
     // Episodes are left out of a conversion, or a doctor finds something.
     let also: BTreeMap<&str, i32> = BTreeMap::from([("convert", 3), ("doctor", 1)]);
     for (name, lines) in &found {

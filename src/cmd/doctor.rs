@@ -3,7 +3,6 @@ use super::{Context, Outcome, output};
 use crate::data::atomic;
 use crate::error::{Error, Result};
 use crate::nn::kernel;
-use crate::report::table::text_table;
 use console::Term;
 use rustix::fs::statvfs;
 use serde::Serialize;
@@ -56,15 +55,19 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome> {
     if args.json {
         output::print_json(&findings)?;
     } else {
-        let word = |state| ["ok", "without", "bad"][state as usize].to_string();
-        let rows: Vec<Vec<String>> =
-            findings.iter().map(|f| vec![word(f.state), f.what.into(), f.is.clone(), f.todo.into()]).collect();
-        output::print(&text_table(&["", "what", "is", "what to do"], &rows))?;
+        output::print(&findings.iter().map(line).collect::<String>())?;
     }
     match findings.iter().filter(|f| f.state == State::Bad).count() {
         0 => Ok(Outcome::Done),
         bad => Err(Error::Failed(format!("{bad} of {} things are bad for hilt here", findings.len()))),
     }
+}
+
+/// A line, and one more with what to do.
+fn line(Finding { what, state, is, todo }: &Finding) -> String {
+    let word = ["ok", "without", "bad"][*state as usize];
+    let todo = if todo.is_empty() { String::new() } else { format!("{:19}{todo}\n", "") };
+    format!("{word:8} {what:9} {is}\n{todo}")
 }
 
 fn finding(what: &'static str, is: impl Into<String>, good: bool, otherwise: (State, &'static str)) -> Finding {

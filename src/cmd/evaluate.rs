@@ -22,7 +22,7 @@ use std::path::{Path, PathBuf};
 /// Run a policy on seeded episodes that no demonstration used: success with its 95 % interval, conditions, failure classes.
 #[derive(Debug, clap::Args)]
 #[command(
-    after_help = "Examples:\n  hilt evaluate --policy policy.safetensors --episodes 500 --seed 1 --record rollouts --out evaluation.json\n  hilt evaluate --policy policy-bc.safetensors --episodes 500 --seed 1 --out evaluation-bc.json\n  hilt evaluate --task stack --policy planner --episodes 500 --json"
+    after_help = "Examples:\n  hilt evaluate --policy policy.safetensors --episodes 500 --record rollouts --out evaluation.json\n  hilt evaluate --policy policy-bc.safetensors --episodes 500 --out evaluation-bc.json\n  hilt evaluate --task stack --policy planner --episodes 500 --json"
 )]
 pub struct Args {
     #[command(flatten)]

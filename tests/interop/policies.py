@@ -60,7 +60,8 @@ def rollouts(directory, layout):
     for path in sorted(directory.glob("*.mcap")):
         with path.open("rb") as stream:
             scene = None
-            for _, channel, _, message in make_reader(stream, decoder_factories=[DecoderFactory()]).iter_decoded_messages():
+            reader = make_reader(stream, decoder_factories=[DecoderFactory()])
+            for _, channel, _, message in reader.iter_decoded_messages(topics=["/hilt/scene", "/hilt/step"]):
                 if channel.topic == "/hilt/scene":
                     scene = message
                 elif channel.topic == "/hilt/step" and not message.final_state:
