@@ -112,7 +112,8 @@ fn to_csv(args: &CsvArgs, context: &Context) -> Result<Outcome> {
 }
 
 fn to_tensorboard(args: &TensorboardArgs, context: &Context) -> Result<Outcome> {
-    let read = args.of.iter().map(PathBuf::as_path);
+    // The events may stand in the run that they are of.
+    let read = args.of.iter().map(PathBuf::as_path).filter(|path| !path.is_dir());
     Places::new().read_all(read).write("--out", &args.out, Content::Events).check(&context.console)?;
     let sources = sources(&args.of, &context.interrupt)?;
     atomic::write_dir(&args.out, tensorboard::is_file, |dir| {

@@ -45,7 +45,8 @@ const BELOW: &str = "\u{1b}[J";
 const CLEAR: &str = "\u{1b}[2J";
 
 pub fn run(args: &Args, context: &Context) -> Result<Outcome> {
-    let read = args.of.iter().map(PathBuf::as_path);
+    // A picture may stand in the run that it is of.
+    let read = args.of.iter().map(PathBuf::as_path).filter(|path| !path.is_dir());
     let places = args.out.iter().fold(Places::new().read_all(read), |places, out| places.write("--out", out, Content::Svg));
     places.check(&context.console)?;
     if args.watch {

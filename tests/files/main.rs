@@ -272,6 +272,6 @@ fn inspect_knows_every_kind() {
         inspect(dir.path(), &Interrupt::default())
             .unwrap_err()
             .to_string()
-            .contains("neither a dataset nor a directory of recordings")
+            .contains("neither a run, a dataset nor a directory of recordings")
     );
 }

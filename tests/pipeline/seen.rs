@@ -69,9 +69,9 @@ fn a_run_by_hand_is_whole_until_something_in_it_is_made_again() {
     expected.sort();
     assert_eq!(sorted, expected);
     let methods: Vec<&str> = found["evaluations"].as_array().expect("some").iter().filter_map(|e| e["method"].as_str()).collect();
-    assert_eq!(methods, ["bc", "hil"]);
+    assert_eq!(methods, ["hil", "bc"]);
     let words = said(&["inspect", at]);
-    assert!(words.starts_with("pick-up by bc: success ") && words.contains("pick-up by hil: success "), "{words}");
+    assert!(words.starts_with("pick-up by hil: success ") && words.contains("\npick-up by bc: success "), "{words}");
 
     // Another plan: what was made from the old one is stale, the policies of it too.
     let again = run.words("plan").into_iter().map(|word| if word == "0" { "5".into() } else { word }).collect();

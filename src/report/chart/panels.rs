@@ -179,7 +179,7 @@ mod tests {
         let of = |class: &str| document.descendants().filter(|n| n.attribute("class") == Some(class)).collect::<Vec<_>>();
         assert_eq!((of("curve").len(), of("key").len()), (4, 2));
         let words: Vec<&str> = document.descendants().filter_map(|n| n.text()).collect();
-        for word in ["small (log)", "below zero", "a<b", "1e-5", "5e-5", "-80", "warm-start 1000"] {
+        for word in ["small (log)", "below zero", "a<b", "1e-5", "5e-5", "-70", "-10", "warm-start 1000"] {
             assert!(words.contains(&word), "{word} is not written in {words:?}");
         }
         for curve in of("curve") {

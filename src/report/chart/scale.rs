@@ -23,6 +23,8 @@ pub(super) struct Scale {
 
 /// Ticks of a linear axis, at most.
 const MOST_TICKS: f64 = 6.0;
+/// A value on a tick lies there, however the division is rounded.
+const ROUNDING: f64 = 1e-9;
 /// Parts of a decade that have ticks, by how many decades the axis has at most; beyond, only their beginnings have.
 const DECADE: [(f64, &[f64]); 2] = [(1.0, &[1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0]), (2.0, &[1.0, 2.0, 5.0])];
 /// A logarithmic axis begins below and ends above its values by this part.
@@ -53,8 +55,8 @@ impl Scale {
         }
         // Of a value that does not change, the axis shows what is around it.
         let apart = if high > low { high - low } else { high.abs().max(f64::MIN_POSITIVE) };
-        let step = step_within(apart);
-        let (first, last) = ((low / step).floor(), (high / step).ceil());
+        let step = step_within(apart * (1.0 - ROUNDING));
+        let (first, last) = ((low / step + ROUNDING).floor(), (high / step - ROUNDING).ceil());
         let last = if last > first { last } else { first + 1.0 };
         let ticks = (0..=(last - first) as u32).map(|i| (first + f64::from(i)) * step).map(|v| (v, number(v))).collect();
         Scale { low: first * step, high: last * step, log: false, ticks }

@@ -102,18 +102,20 @@ impl Evaluated {
         Ok(evaluated)
     }
 
-    fn columns(&self) -> Option<(&[i64], &[bool], &[String], &[i64])> {
-        match ["episode", "success", "failure", "steps"].map(|name| self.episodes.column(name).map(|column| &column.values)) {
+    /// Numbers of the episodes, whether each was solved, why not, and its steps; `None` for another table.
+    fn columns(&self) -> Option<Columns<'_>> {
+        let values = |name| self.episodes.column(name).map(|column| &column.values);
+        match ["episode", "success", "failure", "steps"].map(values) {
             [Some(Values::I64(episode)), Some(Values::Bool(success)), Some(Values::Text(failure)), Some(Values::I64(steps))] => {
-                Some((episode, success, failure, steps))
+                Some(Columns { episode, success, failure, steps })
             }
             _ => None,
         }
     }
 
-    /// Numbers of the episodes, whether each was solved, why not, and its steps.
+    /// How its episodes ended, in the order of the table.
     pub(super) fn outcomes(&self) -> Vec<Outcome<'_>> {
-        let Some((episode, success, failure, steps)) = self.columns() else { return Vec::new() };
+        let Some(Columns { episode, success, failure, steps }) = self.columns() else { return Vec::new() };
         let outcome =
             |row: usize| Outcome { row, episode: episode[row], success: success[row], failure: &failure[row], steps: steps[row] };
         (0..episode.len()).map(outcome).collect()
@@ -124,6 +126,13 @@ impl Evaluated {
         let outcomes = self.outcomes();
         (outcomes.iter().filter(|outcome| outcome.success).count() as u64, outcomes.len() as u64)
     }
+}
+
+struct Columns<'a> {
+    episode: &'a [i64],
+    success: &'a [bool],
+    failure: &'a [String],
+    steps: &'a [i64],
 }
 
 /// How an episode ended.

@@ -124,11 +124,10 @@ fn why_apart(first: &Evaluated, second: &Evaluated, both: &[(Outcome, Outcome)])
         (Values::F64(a), Values::F64(b)) => a[at.0.row].to_bits() == b[at.1.row].to_bits(),
         _ => false,
     };
-    let other = both.iter().find_map(|at| {
+    both.iter().find_map(|at| {
         let column = ours.iter().zip(&theirs).find(|(a, b)| !same(a, b, at))?.0;
         Some(format!("episode {} begins otherwise: {} is not the same", at.0.episode, column.name))
-    });
-    other
+    })
 }
 
 /// Of the episodes that both solved.

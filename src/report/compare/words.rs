@@ -5,7 +5,7 @@ use super::pairing::{Change, Comparison};
 use super::seeds::BySeeds;
 use crate::eval::wilson_95;
 use crate::report::statistics::Estimate;
-use crate::report::table::{text_table, wrapped};
+use crate::report::table::{fitted_table, text_table, wrapped};
 use std::collections::BTreeMap;
 
 /// Settings that are told one by one; the others are counted.
@@ -61,7 +61,7 @@ impl Comparison<'_> {
                 text += &self.changed(width);
             }
         }
-        text + &self.ends() + &self.differing(width)
+        text + &self.ends(width) + &self.differing(width)
     }
 
     /// Which episodes ended otherwise, the most frequent kind of change first.
@@ -86,7 +86,7 @@ impl Comparison<'_> {
     }
 
     /// Failures, conditions and lengths.
-    fn ends(&self) -> String {
+    fn ends(&self, width: Option<usize>) -> String {
         let row = |name: String, [a, b]: [u64; 2]| {
             vec![name, a.to_string(), b.to_string(), format!("{:+}", a.cast_signed() - b.cast_signed())]
         };
@@ -94,7 +94,7 @@ impl Comparison<'_> {
         rows.extend(self.conditions.iter().map(|(name, n)| row(format!("at the end: {name}"), *n)));
         let of = if self.apart.is_none() { "steps where both solved, median" } else { "steps where solved, median" };
         rows.push(row(of.into(), self.steps.map(|steps| steps.p50)));
-        format!("\n{}", text_table(&["", "A", "B", "A - B"], &rows))
+        format!("\n{}", fitted_table(&["", "A", "B", "A - B"], &rows, width))
     }
 
     fn differing(&self, width: Option<usize>) -> String {
@@ -159,7 +159,7 @@ impl BySeeds {
                 rows.push(vec![task.clone(), score.seed.to_string(), cell(score.value), cell(other.value), apart]);
             }
         }
-        text + "\n" + &text_table(&["task", "seed", "A", "B", "A - B"], &rows)
+        text + "\n" + &fitted_table(&["task", "seed", "A", "B", "A - B"], &rows, width)
     }
 }
 

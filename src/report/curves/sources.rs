@@ -99,10 +99,9 @@ fn read(path: &Path) -> Result<Source> {
             return Err(Error::input(path, message));
         }
     };
-    let is_place = |name: &str| match (name, metrics.column(name).map(|column| &column.values)) {
-        ("stage", Some(Values::Text(_))) => true,
-        ("epoch" | "updates", Some(Values::I64(_))) => true,
-        _ => false,
+    let is_place = |name: &str| {
+        let values = metrics.column(name).map(|column| &column.values);
+        matches!((name, values), ("stage", Some(Values::Text(_))) | ("epoch" | "updates", Some(Values::I64(_))))
     };
     if !PLACE.into_iter().all(is_place) {
         let names: Vec<&str> = metrics.columns.iter().map(|column| column.name.as_str()).take(4).collect();

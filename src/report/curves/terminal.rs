@@ -132,6 +132,9 @@ fn block(plot: &Plot, width: usize, marked: bool, style: &Style) -> Vec<(String,
 fn stages(plot: &Plot, inner: usize) -> String {
     let part = inner / plot.stages.len().max(1);
     let name = |name: &String| {
+        // Without its epochs where they do not fit: half of a number is another one.
+        let fits = name.chars().count() < part;
+        let name = if fits { name } else { name.rsplit_once(' ').map_or(name.as_str(), |(name, _)| name) };
         let cut: String = name.chars().take(part.saturating_sub(1)).collect();
         format!("{cut:<part$}")
     };
@@ -225,7 +228,7 @@ mod tests {
         assert_eq!(rows[0], "* hil");
         assert_eq!(rows[1], "l_bc: L_BC");
         assert!(rows[2].starts_with("      19 |") && rows[2].ends_with("****"), "{text}");
-        assert!(rows[6].starts_with("       0 |***"), "{text}");
+        assert!(rows[6].starts_with("       0 | ***"), "{text}");
         assert_eq!(rows[8].trim(), "hil 20");
         for width in [20, 40, 80, 200] {
             let text = draw(&found, &Style { width, ..PLAIN });

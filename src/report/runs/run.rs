@@ -180,14 +180,16 @@ pub(super) fn method_of(path: &Path, made: &Provenance) -> String {
 /// Adds the stages that a policy or a demonstration still needs, and says what of them was begun.
 fn missing(dir: &Path, stages: &mut Vec<Standing>) {
     let has = |stages: &[Standing], stage: Stage| stages.iter().any(|standing| standing.stage == stage);
-    let by_trial = stages.iter().filter(|s| s.stage == Stage::Train).filter_map(|s| s.origin.as_ref());
-    let by_trial = by_trial.map(|(made, _)| made.settings["method"].as_str()).collect::<Vec<_>>();
-    let needs_none = !by_trial.is_empty() && by_trial.iter().all(|method| *method == Some(MethodName::Ppo.name()));
+    let policies = || stages.iter().filter(|s| s.stage == Stage::Train).filter_map(|s| s.origin.as_ref());
+    // Reinforcement learning needs no demos; those of another program have a dataset elsewhere.
+    let elsewhere =
+        |made: &Provenance| made.settings["method"] == MethodName::Ppo.name() || made.settings.get("columns").is_some();
+    let needs_none = policies().count() > 0 && policies().all(|(made, _)| elsewhere(made));
     for stage in Stage::ALL {
         let early = (stage as usize) < Stage::Train as usize;
-        // Planner and policies of elsewhere are evaluated without the rest.
-        let only_judged = !has(stages, Stage::Train) && has(stages, Stage::Evaluate);
-        if has(stages, stage) || (needs_none && early) || (only_judged && stage != Stage::Evaluate) {
+        // A demonstrator and a policy of elsewhere are evaluated without the rest.
+        let only_judged = stages.iter().all(|standing| standing.stage == Stage::Evaluate);
+        if has(stages, stage) || (needs_none && early) || only_judged {
             continue;
         }
         let (name, _) = artefact_of(stage);

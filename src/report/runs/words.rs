@@ -2,6 +2,7 @@
 
 use super::run::{Judged, Run};
 use super::standing::{Condition, Standing, file_name};
+use crate::data::Provenance;
 use crate::report::table::{fitted_table, wrapped};
 use std::fmt::Write;
 
@@ -29,15 +30,35 @@ impl Run {
             text += "\n";
             not_whole.iter().for_each(|line| text += &wrapped(line, width));
         }
-        text += "\nprovenance\n";
-        for standing in &self.stages {
-            let Some((made, content)) = &standing.origin else { continue };
+        text + "\nprovenance\n" + &self.provenance(width)
+    }
+
+    /// What made the artefacts, once where all say the same; then the hashes of their content.
+    fn provenance(&self, width: Option<usize>) -> String {
+        let origins = || self.stages.iter().filter_map(|standing| Some((standing, standing.origin.as_ref()?)));
+        let said = |made: &Provenance| {
             let robot = made.settings["robot"]["name"].as_str().map(|robot| format!(", robot {robot}")).unwrap_or_default();
-            let content = &content.to_string()[..SHORT_HASH];
-            let (name, version, task, seed) = (&standing.name, &made.hilt_version, &made.task, made.seed);
-            text += &wrapped(&format!("  {name}: hilt {version}, task {task}{robot}, seed {seed}, content {content}"), width);
+            format!("hilt {}, task {}{robot}, seed {}", made.hilt_version, made.task, made.seed)
+        };
+        let mut all: Vec<(String, Vec<&str>)> = Vec::new();
+        for (standing, (made, _)) in origins() {
+            let said = said(made);
+            match all.iter_mut().find(|(known, _)| *known == said) {
+                Some((_, names)) => names.push(&standing.name),
+                None => all.push((said, vec![&standing.name])),
+            }
         }
-        text + "  hilt inspect of an artefact has its settings, --json all of them\n"
+        let mut text = String::new();
+        for (said, names) in &all {
+            let of = if all.len() > 1 { format!(": {}", names.join(", ")) } else { String::new() };
+            text += &wrapped(&format!("  {said}{of}"), width);
+        }
+        let contents = origins().map(|(standing, (_, content))| {
+            let content = content.to_string();
+            format!("{} {}", standing.name, &content[..SHORT_HASH])
+        });
+        text += &wrapped(&format!("  content: {}", contents.collect::<Vec<_>>().join(", ")), width);
+        text + &wrapped("  hilt inspect of an artefact has its settings, --json all of them", width)
     }
 }
 
