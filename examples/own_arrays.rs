@@ -26,9 +26,10 @@ pub fn main() -> Result<(), Box<dyn std::error::Error>> {
         aims: vec![],
         arm: None,
     });
-    // 20 demos of 40 steps; a demo has a state more than actions.
+    // 20 demos of 40 steps, each from another place; a demo has a state more than actions.
     let demo = |number: usize| {
-        let (mut at, mut states, mut actions) = ([(number as f32).sin(), (2.0 * number as f32).cos()], vec![], vec![]);
+        let (mut at, mut states, mut actions) =
+            ([(number % 5) as f32 / 2.0 - 1.0, (number / 5) as f32 / 2.0 - 0.75], vec![], vec![]);
         for _ in 0..40 {
             let velocity = at.map(|x| -BACK_PER_S * x);
             states.extend(at);

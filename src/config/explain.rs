@@ -23,8 +23,17 @@ pub struct Explained {
     pub allowed: Option<String>,
     /// Its value where nothing is said.
     pub default: String,
-    /// By preset, what it says for which tasks.
-    pub presets: Vec<(&'static str, Vec<(String, Vec<String>)>)>,
+    /// What each preset says.
+    pub presets: Vec<OfPreset>,
+}
+
+/// What a preset says of a key.
+#[derive(Clone, Debug, PartialEq)]
+pub struct OfPreset {
+    /// The preset.
+    pub name: &'static str,
+    /// Each value with its tasks.
+    pub values: Vec<(String, Vec<String>)>,
 }
 
 /// Every key that is `asked`, or stands in a section that is; all of them where nothing is asked. The presets' values are those for `task`, or for the
@@ -85,7 +94,7 @@ fn explained(
         choices,
         allowed: Range::of(key).map(|range| range.to_string()),
         default: default.to_string(),
-        presets: presets.iter().map(|(name, tables)| (*name, values(tables))).collect(),
+        presets: presets.iter().map(|(name, tables)| OfPreset { name, values: values(tables) }).collect(),
     }
 }
 
@@ -123,11 +132,11 @@ impl fmt::Display for Explained {
             writeln!(f, "  allowed: {allowed}")?;
         }
         writeln!(f, "  default: {}", self.default)?;
-        for (preset, values) in &self.presets {
+        for OfPreset { name, values } in &self.presets {
             let one = values.len() == 1;
             let said =
                 values.iter().map(|(value, tasks)| if one { value.clone() } else { format!("{value} ({})", tasks.join(", ")) });
-            writeln!(f, "  {preset}: {}", said.collect::<Vec<_>>().join("; "))?;
+            writeln!(f, "  {name}: {}", said.collect::<Vec<_>>().join("; "))?;
         }
         Ok(())
     }
@@ -143,7 +152,7 @@ mod tests {
         assert!(all.len() > 100, "{} keys", all.len());
         for one in &all {
             assert!(one.words.len() > 5 && !one.default.is_empty(), "{one:?}");
-            assert!(one.presets.iter().all(|(_, values)| values.iter().all(|(value, _)| !value.is_empty())), "{one:?}");
+            assert!(one.presets.iter().all(|of| of.values.iter().all(|(value, _)| !value.is_empty())), "{one:?}");
             assert!(one.choices.iter().all(|(_, words)| !words.is_empty()), "{one:?}");
         }
         // Every number has a range, whatever its field is called.

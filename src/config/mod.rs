@@ -25,7 +25,7 @@ pub use choices::{
     ActionChoice, Alpha, Convergence, FeatureSet, FingerCloning, ModelLoss, Objective, Pairs, StateScale, Structure,
 };
 pub use data::{ConvertSettings, EvaluateSettings};
-pub use explain::{Explained, explain};
+pub use explain::{Explained, OfPreset, explain};
 pub use learning::LearningSettings;
 pub use load::Source;
 pub use ppo::{PpoSettings, RewardKind};

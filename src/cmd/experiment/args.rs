@@ -5,7 +5,7 @@ use std::path::PathBuf;
 
 /// Run an experiment: a grid of tasks, presets, variations, methods and seeds as ordinary stages, each once. Stopped, the same command goes on.
 #[derive(Debug, clap::Args)]
-#[command(after_help = "Examples:\n  hilt experiment few-demos --dry-run\n  hilt experiment smoke --episodes 4")]
+#[command(after_help = "Example:\n  hilt experiment few-demos --dry-run")]
 pub struct Args {
     /// Name of an experiment in pipelines/experiments, or a file
     #[arg(value_name = "NAME|FILE.toml")]
