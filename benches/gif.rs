@@ -43,5 +43,12 @@ fn main() {
         write_gif(&episode, &options, &Interrupt::default(), &mut bytes).expect("an animation");
     });
     head(&["pictures", "size", "fastest s", "median s", "bytes"]);
-    println!("| {PICTURES} | {} x {} | {:.3} | {:.3} | {} |", options.width, options.height, taken[0], median(&taken), bytes.len());
+    println!(
+        "| {PICTURES} | {} x {} | {:.3} | {:.3} | {} |",
+        options.width,
+        options.height,
+        taken[0],
+        median(&taken),
+        bytes.len()
+    );
 }

@@ -31,7 +31,12 @@ fn made() -> &'static Made {
         record("stack", "jaco", "stack", &["--episodes", "4"]);
         record("bin", "panda", "bin", &["--episodes", "1"]);
         // Without friction nothing can be held: all fail.
-        record("pick-up", "jaco", "slippery", &["--episodes", "3", "--render", "2", "--set", "scene.friction=0.0", "--set", "evaluate.horizon_steps=120"]);
+        record(
+            "pick-up",
+            "jaco",
+            "slippery",
+            &["--episodes", "3", "--render", "2", "--set", "scene.friction=0.0", "--set", "evaluate.horizon_steps=120"],
+        );
         made
     })
 }
@@ -58,7 +63,19 @@ fn path(path: &Path) -> &str {
 fn shown(page: &Path) -> Value {
     // A namespace is a name, nothing is asked there.
     let html = fs::read_to_string(page).expect("a page").replace("http://www.w3.org/2000/svg", "svg");
-    for foreign in ["http:", "https:", "//cdn", "src=\"", "@import", "url(", "<iframe", "<link rel=\"stylesheet", "fetch(", "XMLHttpRequest", "WebSocket"] {
+    for foreign in [
+        "http:",
+        "https:",
+        "//cdn",
+        "src=\"",
+        "@import",
+        "url(",
+        "<iframe",
+        "<link rel=\"stylesheet",
+        "fetch(",
+        "XMLHttpRequest",
+        "WebSocket",
+    ] {
         assert!(!html.contains(foreign), "{foreign} in the page");
     }
     assert!(!html.contains("{{"), "a place is left");
@@ -94,12 +111,19 @@ fn a_page_of_four_episodes_is_small_and_holds_the_recordings_numbers() {
         let (episode, _) = recording::read(file).expect("a recording");
         let rows: Vec<f32> = episode.steps.iter().chain([&episode.last]).flat_map(row).collect();
         assert_eq!(f32s(&told["rows"]), rows);
-        assert_eq!((told["steps"].as_u64(), told["success"].as_bool()), (Some(episode.steps.len() as u64), Some(episode.success)));
+        assert_eq!(
+            (told["steps"].as_u64(), told["success"].as_bool()),
+            (Some(episode.steps.len() as u64), Some(episode.success))
+        );
         let phases: Vec<&str> = told["phases"].as_array().expect("phases").iter().filter_map(|span| span[2].as_str()).collect();
         assert_eq!(phases, ["approach", "close", "carry", "open", "retreat"]);
         let marks: Vec<&str> = told["milestones"].as_array().expect("marks").iter().filter_map(|mark| mark[1].as_str()).collect();
         assert_eq!(marks, ["reached", "grasped", "lifted", "on base"]);
-        assert!(told["touches"].as_array().expect("touches").iter().any(|touch| touch["name"] == "block on base"), "{}", told["touches"]);
+        assert!(
+            told["touches"].as_array().expect("touches").iter().any(|touch| touch["name"] == "block on base"),
+            "{}",
+            told["touches"]
+        );
     }
     // The same bytes again, by the other command.
     done(out.path(), &["render", path(&made.at("stack")), "--html", "--out", "again.html", "--threads", "1"]);
@@ -124,7 +148,8 @@ fn an_evaluation_that_fails_gets_an_atlas() {
     let data = shown(&made.at("slippery.html"));
     let atlas = &data["atlas"];
     assert_eq!(atlas["outcomes"].as_array().map(Vec::len), Some(3), "every episode is on the map");
-    let classes: Vec<u64> = atlas["classes"].as_array().expect("classes").iter().filter_map(|class| class["count"].as_u64()).collect();
+    let classes: Vec<u64> =
+        atlas["classes"].as_array().expect("classes").iter().filter_map(|class| class["count"].as_u64()).collect();
     assert_eq!((classes[0], classes.iter().sum::<u64>()), (0, 3), "all fail: {atlas}");
     let (episode, _) = recording::read(&made.at("slippery/episode-00001.mcap")).expect("a recording");
     let [x, y, _] = episode.scene.objects[0].pose.position_m;
@@ -164,7 +189,8 @@ fn a_replay_by_the_same_controller_and_seed_is_the_recording() {
     assert!(noisy.steps[..10] == original.steps[..10]);
     assert_ne!(noisy.steps[10].executed, original.steps[10].executed);
     // A replay can be replayed, and looked at.
-    let again = done(out.path(), &["replay", "--from", "noisy.mcap", "--at", "0.7", "--policy", "planner", "--out", "again.mcap"]);
+    let again =
+        done(out.path(), &["replay", "--from", "noisy.mcap", "--at", "0.7", "--policy", "planner", "--out", "again.mcap"]);
     assert!(again.contains("restored exactly"), "{again}");
     done(out.path(), &["view", path(&file), "noisy.mcap", "again.mcap", "--no-open"]);
 }
@@ -221,7 +247,8 @@ fn bad_input_is_refused_and_nothing_is_lost() {
     view(&[good, "--dynamics", path(&policy)], 1, "policy.safetensors");
     refused(out.path(), &["render", good, good, "--gif"], 2, "a picture shows one");
 
-    let replay = |words: &[&str], code: i32, says: &str| refused(out.path(), &[&["replay", "--from"], words].concat(), code, says);
+    let replay =
+        |words: &[&str], code: i32, says: &str| refused(out.path(), &[&["replay", "--from"], words].concat(), code, says);
     replay(&["noise.mcap", "--policy", "planner"], 1, "is not an MCAP file");
     replay(&["short.mcap", "--policy", "planner"], 1, "cut short");
     replay(&[good, "--policy", "planner", "--at", "99"], 2, "allowed: 0 to");

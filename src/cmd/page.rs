@@ -88,7 +88,11 @@ impl Source {
 /// A title for what is shown: the name of the only input, or what there is.
 pub fn title_of(inputs: &[PathBuf]) -> String {
     match inputs {
-        [one] => std::path::absolute(one).ok().as_deref().and_then(Path::file_stem).map_or("hilt".into(), |name| name.to_string_lossy().into_owned()),
+        [one] => std::path::absolute(one)
+            .ok()
+            .as_deref()
+            .and_then(Path::file_stem)
+            .map_or("hilt".into(), |name| name.to_string_lossy().into_owned()),
         several => format!("{} inputs", several.len()),
     }
 }
@@ -143,7 +147,10 @@ pub fn atlas(title: &str, dir: &Path, most: usize, args: &PageArgs, context: &Co
     let Some(task) = tasks.first().cloned() else { return Err(Error::input(dir, "holds no recordings")) };
     if let Some(i) = tasks.iter().position(|other| *other != task) {
         let (file, other) = (files[i].file_name().unwrap_or_default().display(), &tasks[i]);
-        return Err(Error::input(dir, format!("{file} in it is of task {other}, those before are of {task}; an atlas is of one task")));
+        return Err(Error::input(
+            dir,
+            format!("{file} in it is of task {other}, those before are of {task}; an atlas is of one task"),
+        ));
     }
     let atlas = Atlas { task, starts };
     let chosen: Vec<PathBuf> = atlas.chosen(most).into_iter().map(|i| files[i].clone()).collect();

@@ -62,7 +62,10 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome> {
         return Ok(Outcome::Done);
     }
     let [recording] = args.recordings.as_slice() else {
-        return Err(Error::Usage(format!("{} recordings: a picture shows one; several go on a page with --html", args.recordings.len())));
+        return Err(Error::Usage(format!(
+            "{} recordings: a picture shows one; several go on a page with --html",
+            args.recordings.len()
+        )));
     };
     let (ending, content) = if args.format.gif { ("gif", Content::Gif) } else { ("png", Content::Png) };
     // Not beside the recording: a directory of recordings is an artefact of its own.

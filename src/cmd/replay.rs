@@ -85,14 +85,19 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome> {
         return Err(Error::input(&args.from, message));
     }
 
-    let mut provenance = Provenance::new(STAGE, &recorded.scene.task.name, made.settings.clone(), replay.seed).with_input("recording", &content);
+    let mut provenance =
+        Provenance::new(STAGE, &recorded.scene.task.name, made.settings.clone(), replay.seed).with_input("recording", &content);
     provenance = policy.iter().fold(provenance, |made, policy| made.with_input("policy", policy));
     provenance.settings["simulate"]["noise_variance"] = pipeline.simulate.noise_variance.into();
     provenance.settings["policy"] = said;
     provenance.settings[STAGE] = json!({ "step": at, "noise": stream, "pulses": pulses, "of": made.stage });
     atomic::write_bytes(&out, &recording::encode(&out, &episode, &provenance)?)?;
     let told = Told { at, apart, recorded: &recorded, who: who(&made), episode: &episode, out: &out };
-    if args.json { output::print_json(&told.json())? } else { output::print(&told.words())? }
+    if args.json {
+        output::print_json(&told.json())?
+    } else {
+        output::print(&told.words())?
+    }
     Ok(Outcome::Done)
 }
 
@@ -111,7 +116,8 @@ fn pipeline(path: &Path, recorded: &Episode, made: &Provenance, noise: Option<f6
     fn section<T: DeserializeOwned + Default>(path: &Path, made: &Provenance, name: &str) -> Result<T> {
         match made.settings.get(name) {
             None | Some(Value::Null) => Ok(T::default()),
-            Some(said) => serde_json::from_value(said.clone()).map_err(|e| Error::input(path, format!("its settings [{name}] cannot be read: {e}"))),
+            Some(said) => serde_json::from_value(said.clone())
+                .map_err(|e| Error::input(path, format!("its settings [{name}] cannot be read: {e}"))),
         }
     }
     let mut pipeline = Pipeline::defaults(&recorded.scene.task);
@@ -147,7 +153,9 @@ fn controller(from: Moment, subject: &Subject, replay: &Replay, context: &Contex
         let held = from.held();
         if !held.is_empty() {
             let held = held.join(" and ");
-            let message = format!("--at: the fingers are on {held} then, and the planner begins with an open hand; choose a moment without, or a policy");
+            let message = format!(
+                "--at: the fingers are on {held} then, and the planner begins with an open hand; choose a moment without, or a policy"
+            );
             return Err(Error::Usage(message));
         }
         pipeline.robot = scene.robot.clone().into();
@@ -170,9 +178,7 @@ struct Told<'a> {
 
 impl Told<'_> {
     fn json(&self) -> Value {
-        let of = |episode: &Episode| {
-            json!({ "success": episode.success, "failure": episode.failure.map(|class| class.name()), "steps": episode.steps.len() })
-        };
+        let of = |episode: &Episode| json!({ "success": episode.success, "failure": episode.failure.map(|class| class.name()), "steps": episode.steps.len() });
         json!({
             "episode": self.recorded.index,
             "step": self.at,

@@ -38,7 +38,13 @@ pub(super) fn all(episode: &Episode, ghost: Option<&Ghost>) -> Vec<Value> {
     let (turning, sliding) = (of_kind(JointKind::Revolute), of_kind(JointKind::Prismatic));
     let charts = [
         Chart { title: "Distances", unit: "m", digits: 3, compare: true, lines: distances(episode) },
-        Chart { title: "Dynamics network off by", unit: "mm", digits: 1, compare: true, lines: ghost.map_or_else(Vec::new, |ghost| off_mm(episode, ghost)) },
+        Chart {
+            title: "Dynamics network off by",
+            unit: "mm",
+            digits: 1,
+            compare: true,
+            lines: ghost.map_or_else(Vec::new, |ghost| off_mm(episode, ghost)),
+        },
         Chart { title: "Force of the fingers", unit: "N", digits: 1, compare: true, lines: forces(episode) },
         Chart { title: "Joint velocities", unit: "rad/s", digits: 2, compare: false, lines: turning },
         Chart { title: "Sliding joints", unit: "m/s", digits: 3, compare: false, lines: sliding },

@@ -4,7 +4,9 @@ use super::parts::{Parts, rows};
 use super::{Shown, atlas, charts, events};
 use crate::demo::{Episode, Step};
 use crate::error::Result;
-use crate::report::render::{MARKER_OPACITY, colors, marker, mesh::Mesh, obstacles};
+use crate::report::render::colors;
+use crate::report::render::fixed::{MARKER_OPACITY, marker, obstacles};
+use crate::report::render::mesh::Mesh;
 use crate::scene::Scene;
 use crate::task::FailureClass;
 use serde_json::{Value, json};
@@ -19,7 +21,9 @@ pub(super) fn content(shown: &Shown, picture: bool, parts: &mut Parts) -> Result
             json!({ "name": object.name, "mesh": mesh, "rgb": colors::of_object(task, i), "moved": i < task.moved() })
         })
         .collect();
-    let ghost_rows = ghost.as_ref().map(|ghost| json!({ "ahead": ghost.ahead, "rows": rows(ghost.rows.iter().map(|row| row.iter().copied())) }));
+    let ghost_rows = ghost
+        .as_ref()
+        .map(|ghost| json!({ "ahead": ghost.ahead, "rows": rows(ghost.rows.iter().map(|row| row.iter().copied())) }));
     Ok(json!({
         "name": name,
         "about": about,

@@ -42,7 +42,9 @@ pub(super) fn touches(episode: &Episode) -> Vec<Value> {
     for (i, object) in objects.iter().enumerate() {
         for (k, other) in objects.iter().enumerate().skip(i + 1) {
             let name = format!("{} on {}", object.name, other.name);
-            add("objects", name, &|contacts| contacts.objects[i].objects.contains(&k) || contacts.objects[k].objects.contains(&i));
+            add("objects", name, &|contacts| {
+                contacts.objects[i].objects.contains(&k) || contacts.objects[k].objects.contains(&i)
+            });
         }
     }
     add("bad", "robot on obstacle".into(), &|contacts| contacts.robot_obstacle);

@@ -108,7 +108,9 @@ pub fn names(files: &[&Path]) -> Vec<String> {
         .collect();
     let shared = |back: bool| {
         let part = |of: &[String], i: usize| if back { of.iter().rev().nth(i).cloned() } else { of.get(i).cloned() };
-        (0..).take_while(|i| part(&parents[0], *i).is_some() && parents.iter().all(|of| part(of, *i) == part(&parents[0], *i))).count()
+        (0..)
+            .take_while(|i| part(&parents[0], *i).is_some() && parents.iter().all(|of| part(of, *i) == part(&parents[0], *i)))
+            .count()
     };
     if files.is_empty() || parents.iter().all(|parent| *parent == parents[0]) {
         return files.iter().map(|file| stem(file)).collect();
