@@ -139,7 +139,7 @@ fn robots_and_tasks_may_be_mixed_and_episodes_chosen() {
     let names: Vec<&str> = data["episodes"].as_array().expect("a list").iter().filter_map(|e| e["name"].as_str()).collect();
     assert_eq!(names, ["stack episode 0", "bin episode 0"]);
     assert_eq!(data["robots"].as_array().map(Vec::len), Some(2));
-    assert_eq!(data["title"], "2 inputs");
+    assert_eq!(data["title"], "stack, bin");
 }
 
 #[test]
@@ -246,6 +246,7 @@ fn bad_input_is_refused_and_nothing_is_lost() {
     view(&["mixed", "--atlas", "2"], 1, "is of task bin, those before are of stack");
     view(&[good, "--dynamics", path(&policy)], 1, "policy.safetensors");
     refused(out.path(), &["render", good, good, "--gif"], 2, "a picture shows one");
+    refused(out.path(), &["render", good, "--gif", "--episodes", "3"], 2, "give --html");
 
     let replay =
         |words: &[&str], code: i32, says: &str| refused(out.path(), &[&["replay", "--from"], words].concat(), code, says);

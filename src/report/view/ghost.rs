@@ -4,6 +4,7 @@ use super::episode::moments;
 use crate::demo::Episode;
 use crate::learn::Dynamics;
 use crate::state::{Pose, State};
+use rayon::prelude::*;
 
 /// Of each moment t: positions of the joints and a pose of each object as the network has them after open loop from the recorded state of `ahead` steps
 /// before (at the start of the episode, from its first) with the commands that were executed.
@@ -29,7 +30,7 @@ impl Ghost {
                 if next.iter().all(|v| v.is_finite()) { next } else { state }
             })
         };
-        Ghost { ahead, rows: (0..states.len()).map(|t| row(episode, t, &expected(t))).collect() }
+        Ghost { ahead, rows: (0..states.len()).into_par_iter().map(|t| row(episode, t, &expected(t))).collect() }
     }
 }
 
