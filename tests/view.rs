@@ -3,7 +3,7 @@
 use assert_cmd::Command;
 use base64::Engine as _;
 use hilt::data::recording;
-use hilt::demo::Step;
+use hilt::demo::{Phase, Step};
 use serde_json::Value;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -116,7 +116,9 @@ fn a_page_of_four_episodes_is_small_and_holds_the_recordings_numbers() {
             (Some(episode.steps.len() as u64), Some(episode.success))
         );
         let phases: Vec<&str> = told["phases"].as_array().expect("phases").iter().filter_map(|span| span[2].as_str()).collect();
-        assert_eq!(phases, ["approach", "close", "carry", "open", "retreat"]);
+        let mut walked: Vec<&str> = episode.steps.iter().filter_map(|step| step.phase).map(Phase::name).collect();
+        walked.dedup();
+        assert_eq!(phases, walked);
         let marks: Vec<&str> = told["milestones"].as_array().expect("marks").iter().filter_map(|mark| mark[1].as_str()).collect();
         assert_eq!(marks, ["reached", "grasped", "lifted", "on base"]);
         assert!(

@@ -1,6 +1,5 @@
 //! What the dynamics network expected, some steps before, of every moment.
 
-use super::episode::moments;
 use crate::demo::Episode;
 use crate::learn::Dynamics;
 use crate::state::{Pose, State};
@@ -19,7 +18,7 @@ pub struct Ghost {
 impl Ghost {
     /// By a network of the episode's robot and task.
     pub fn new(episode: &Episode, dynamics: &Dynamics, ahead: usize) -> Self {
-        let states: Vec<Vec<f32>> = moments(episode).map(|step| step.state.to_row()).collect();
+        let states: Vec<Vec<f32>> = episode.moments().map(|step| step.state.to_row()).collect();
         let executed: Vec<Vec<f32>> =
             episode.steps.iter().map(|step| step.executed.iter().map(|v| *v as f32).collect()).collect();
         let expected = |t: usize| {
