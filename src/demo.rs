@@ -116,6 +116,13 @@ pub struct Episode {
     pub failure: Option<FailureClass>,
 }
 
+impl Episode {
+    /// Every moment: before each step, and the last.
+    pub fn moments(&self) -> impl Iterator<Item = &Step> {
+        self.steps.iter().chain([&self.last])
+    }
+}
+
 /// d = <(s_t^E, a_t^E)>: one demo trajectory, T + 1 states and T actions, row-major f32.
 ///
 /// ```

@@ -3,7 +3,7 @@
 use assert_cmd::Command;
 use base64::Engine as _;
 use hilt::data::recording;
-use hilt::demo::Step;
+use hilt::demo::{Phase, Step};
 use serde_json::Value;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -116,7 +116,9 @@ fn a_page_of_four_episodes_is_small_and_holds_the_recordings_numbers() {
             (Some(episode.steps.len() as u64), Some(episode.success))
         );
         let phases: Vec<&str> = told["phases"].as_array().expect("phases").iter().filter_map(|span| span[2].as_str()).collect();
-        assert_eq!(phases, ["approach", "close", "carry", "open", "retreat"]);
+        let mut walked: Vec<&str> = episode.steps.iter().filter_map(|step| step.phase).map(Phase::name).collect();
+        walked.dedup();
+        assert_eq!(phases, walked);
         let marks: Vec<&str> = told["milestones"].as_array().expect("marks").iter().filter_map(|mark| mark[1].as_str()).collect();
         assert_eq!(marks, ["reached", "grasped", "lifted", "on base"]);
         assert!(
@@ -139,7 +141,7 @@ fn robots_and_tasks_may_be_mixed_and_episodes_chosen() {
     let names: Vec<&str> = data["episodes"].as_array().expect("a list").iter().filter_map(|e| e["name"].as_str()).collect();
     assert_eq!(names, ["stack episode 0", "bin episode 0"]);
     assert_eq!(data["robots"].as_array().map(Vec::len), Some(2));
-    assert_eq!(data["title"], "2 inputs");
+    assert_eq!(data["title"], "stack, bin");
 }
 
 #[test]
@@ -246,6 +248,7 @@ fn bad_input_is_refused_and_nothing_is_lost() {
     view(&["mixed", "--atlas", "2"], 1, "is of task bin, those before are of stack");
     view(&[good, "--dynamics", path(&policy)], 1, "policy.safetensors");
     refused(out.path(), &["render", good, good, "--gif"], 2, "a picture shows one");
+    refused(out.path(), &["render", good, "--gif", "--episodes", "3"], 2, "give --html");
 
     let replay =
         |words: &[&str], code: i32, says: &str| refused(out.path(), &[&["replay", "--from"], words].concat(), code, says);

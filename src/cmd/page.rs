@@ -37,6 +37,13 @@ pub struct PageArgs {
     ahead: u32,
 }
 
+impl PageArgs {
+    /// Whether any of them is asked for.
+    pub fn given(&self) -> bool {
+        self.episodes.is_some() || self.atlas.is_some() || self.dynamics.is_some()
+    }
+}
+
 /// Where recordings are: a file, or a directory with its files.
 #[derive(Debug)]
 struct Source {
@@ -85,15 +92,18 @@ impl Source {
     }
 }
 
-/// A title for what is shown: the name of the only input, or what there is.
+/// Names of so many inputs are a title; more are counted.
+const MOST_NAMED: usize = 4;
+
+/// A title for what is shown: the names of the inputs.
 pub fn title_of(inputs: &[PathBuf]) -> String {
-    match inputs {
-        [one] => std::path::absolute(one)
-            .ok()
-            .as_deref()
-            .and_then(Path::file_stem)
-            .map_or("hilt".into(), |name| name.to_string_lossy().into_owned()),
-        several => format!("{} inputs", several.len()),
+    let name = |input: &PathBuf| {
+        let whole = std::path::absolute(input).ok();
+        whole.as_deref().and_then(Path::file_stem).map_or("hilt".into(), |name| name.to_string_lossy().into_owned())
+    };
+    match inputs.len() {
+        ..=MOST_NAMED => inputs.iter().map(name).collect::<Vec<_>>().join(", "),
+        several => format!("{several} inputs"),
     }
 }
 

@@ -64,6 +64,9 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome> {
         context.console.say(&format!("render: wrote {}", out.display()));
         return Ok(Outcome::Done);
     }
+    if args.page.given() {
+        return Err(Error::Usage("--episodes, --atlas and --dynamics are for a page: give --html".into()));
+    }
     let [recording] = args.recordings.as_slice() else {
         return Err(Error::Usage(format!(
             "{} recordings: a picture shows one; several go on a page with --html",

@@ -17,7 +17,7 @@ use std::path::Path;
 /// One episode.
 pub(super) fn one(path: &Path) -> Result<Value> {
     let (episode, provenance) = recording::read(path)?;
-    let states: Vec<f32> = moments(&episode).flat_map(|s| s.state.to_row()).collect();
+    let states: Vec<f32> = episode.moments().flat_map(|s| s.state.to_row()).collect();
     let actions =
         |pick: fn(&Step) -> &Action| episode.steps.iter().flat_map(|s| pick(s).iter().map(|v| *v as f32)).collect::<Vec<_>>();
     let layout = episode.scene.task.layout(&episode.scene.robot);
@@ -88,7 +88,7 @@ impl Glance {
             reward: reward(episode),
             success: episode.success,
             failure: episode.failure,
-            hit: moments(episode).any(|s| s.contacts.robot_obstacle),
+            hit: episode.moments().any(|s| s.contacts.robot_obstacle),
         }
     }
 }
@@ -200,18 +200,14 @@ fn differences(first: &Provenance, other: &Provenance) -> String {
     parts.iter().filter(|(_, differ)| *differ).map(|(name, _)| *name).collect::<Vec<_>>().join(", ")
 }
 
-fn moments(episode: &Episode) -> impl Iterator<Item = &Step> {
-    episode.steps.iter().chain([&episode.last])
-}
-
 fn reward(episode: &Episode) -> f64 {
-    moments(episode).map(|s| s.reward).sum()
+    episode.moments().map(|s| s.reward).sum()
 }
 
 /// For each condition: at which step it first held, and whether it holds at the end.
 fn conditions(episode: &Episode) -> Vec<Value> {
     let entry = |(i, name): (usize, &String)| {
-        let first = moments(episode).position(|s| s.conditions[i]);
+        let first = episode.moments().position(|s| s.conditions[i]);
         json!({ "name": name, "first_step": first, "at_end": episode.last.conditions[i] })
     };
     episode.scene.task.condition_names().iter().enumerate().map(entry).collect()
@@ -231,7 +227,7 @@ fn scene(scene: &Scene) -> Value {
 
 /// Steps in which something touched something, by the object's name.
 fn contacts(episode: &Episode) -> Value {
-    let count = |holds: &dyn Fn(&Step) -> bool| moments(episode).filter(|s| holds(s)).count();
+    let count = |holds: &dyn Fn(&Step) -> bool| episode.moments().filter(|s| holds(s)).count();
     let task = &episode.scene.task;
     let mut counts = Map::new();
     for (i, object) in task.objects.iter().enumerate().take(task.moved()) {

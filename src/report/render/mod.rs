@@ -2,6 +2,7 @@
 
 pub(in crate::report) mod camera;
 pub(in crate::report) mod colors;
+pub(in crate::report) mod fixed;
 mod font;
 mod gif;
 pub(in crate::report) mod links;
@@ -21,6 +22,7 @@ use crate::error::{Error, Result};
 use crate::robot::Robot;
 use crate::scene::Scene;
 use camera::Camera;
+use fixed::{MARKER_OPACITY, marker, obstacles};
 use mesh::{Detail, Mesh};
 use nalgebra::{Isometry3, Translation3};
 use raster::{Area, Paint, Rgb, Samples};
@@ -34,12 +36,6 @@ pub(in crate::report) const TABLE_M: [[f64; 2]; 2] = [[-0.14, 0.72], [-0.30, 0.4
 pub(in crate::report) const TABLE_THICKNESS_M: f64 = 0.03;
 /// The table's upper layer, which takes shadows \[m\].
 const TOP_LAYER_M: f64 = 0.001;
-/// Half thickness of the bars around the target \[m\].
-const MARKER_HALF_BAR_M: f64 = 0.0012;
-/// Room between a block that stands exactly on the target and the marker's faces \[m\].
-const MARKER_ROOM_M: f64 = 0.003;
-/// Opacity of the marker's faces.
-pub(in crate::report) const MARKER_OPACITY: f32 = 0.18;
 /// Tag of the samples that take shadows.
 const TAG_TABLE: u8 = 1;
 /// Smallest and largest picture edge that writers accept \[pixels\].
@@ -153,22 +149,6 @@ impl Renderer {
         solids.extend(self.obstacles.iter().map(|mesh| (mesh, Isometry3::identity(), colors::OBSTACLE)));
         solids
     }
-}
-
-/// What shows where objects are to be: bars along the edges, and faces between them to be seen through.
-pub(in crate::report) fn marker(scene: &Scene) -> [Mesh; 2] {
-    let (mut bars, mut faces) = (Mesh::default(), Mesh::default());
-    for (goal, of) in scene.task.goals.iter().enumerate() {
-        let around = scene.task.objects[of.object].shape.half_m().map(|half| half + MARKER_ROOM_M);
-        bars.append(&Mesh::frame(scene.target_m(goal), around, MARKER_HALF_BAR_M));
-        faces.append(&Mesh::cuboid(scene.target_m(goal), around));
-    }
-    [bars, faces]
-}
-
-/// Boxes to keep clear of.
-pub(in crate::report) fn obstacles(scene: &Scene) -> impl Iterator<Item = Mesh> {
-    scene.obstacles.iter().map(|o| Mesh::cuboid(o.center_m, o.size_m.map(|v| v / 2.0)))
 }
 
 /// Draws what stands on the table, with its shadows: mesh, where it is, colour. The cameras are those of samples and pixels.

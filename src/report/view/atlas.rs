@@ -1,8 +1,7 @@
 //! The failure atlas: how all episodes of an evaluation end, where they start, and pictures of some.
 
-use super::Shown;
-use super::episode::class_words;
 use super::pack;
+use super::shown::{Shown, class_words};
 use crate::demo::Episode;
 use crate::error::{Error, Result};
 use crate::report::render::{frame, write_png};

@@ -1,6 +1,5 @@
 //! Numbers along an episode: distances, forces, joint velocities, how far the dynamics network was off.
 
-use super::episode::moments;
 use super::ghost::Ghost;
 use super::pack::f32s;
 use crate::demo::{Episode, Step};
@@ -53,7 +52,7 @@ pub(super) fn all(episode: &Episode, ghost: Option<&Ghost>) -> Vec<Value> {
 }
 
 fn along(episode: &Episode, of: impl Fn(&Step) -> f64) -> Vec<f64> {
-    moments(episode).map(of).collect()
+    episode.moments().map(of).collect()
 }
 
 /// Of each object that a goal moves: from the hand, and from where it is to be \[m\].
@@ -84,7 +83,7 @@ fn off_mm(episode: &Episode, ghost: &Ghost) -> Vec<(String, Vec<f64>)> {
     const MM: f64 = 1000.0;
     let (robot, task) = (&episode.scene.robot, &episode.scene.task);
     let joints = robot.joints.len();
-    let both = |of: &dyn Fn(&Step, &[f64]) -> f64| moments(episode).zip(&ghost.rows).map(|(step, row)| of(step, row)).collect();
+    let both = |of: &dyn Fn(&Step, &[f64]) -> f64| episode.moments().zip(&ghost.rows).map(|(step, row)| of(step, row)).collect();
     let tool = |q: &[f64]| robot.tool_pose(q).translation.vector;
     let hand = ("hand".to_string(), both(&|step, row| MM * (tool(&step.state.q) - tool(&row[..joints])).norm()));
     let of_object = |i: usize| {

@@ -1,12 +1,14 @@
 //! An episode as the page holds it.
 
 use super::parts::{Parts, rows};
-use super::{Shown, atlas, charts, events};
-use crate::demo::{Episode, Step};
+use super::shown::{Shown, ending};
+use super::{atlas, charts, events};
+use crate::demo::Step;
 use crate::error::Result;
-use crate::report::render::{MARKER_OPACITY, colors, marker, mesh::Mesh, obstacles};
+use crate::report::render::colors;
+use crate::report::render::fixed::{MARKER_OPACITY, marker, obstacles};
+use crate::report::render::mesh::Mesh;
 use crate::scene::Scene;
-use crate::task::FailureClass;
 use serde_json::{Value, json};
 
 /// All that the page needs of it; `picture` adds one of its end.
@@ -31,7 +33,7 @@ pub(super) fn content(shown: &Shown, picture: bool, parts: &mut Parts) -> Result
         "robot": parts.robot(&scene.robot),
         "objects": objects,
         "fixed": fixed(scene, parts),
-        "rows": rows(moments(episode).map(row)),
+        "rows": rows(episode.moments().map(row)),
         "ghost": ghost_rows,
         "phases": events::phases(episode),
         "touches": events::touches(episode),
@@ -41,28 +43,9 @@ pub(super) fn content(shown: &Shown, picture: bool, parts: &mut Parts) -> Result
     }))
 }
 
-/// Every state, also the last.
-pub(super) fn moments(episode: &Episode) -> impl Iterator<Item = &Step> {
-    episode.steps.iter().chain([&episode.last])
-}
-
 /// Positions of the joints, then a pose of each object.
 fn row(step: &Step) -> impl Iterator<Item = f64> {
     step.state.q.iter().copied().chain(step.objects.iter().flat_map(|object| object.pose.to_array()))
-}
-
-/// How it ended, in words.
-pub(super) fn ending(episode: &Episode) -> String {
-    match episode.failure {
-        _ if episode.success => "success".into(),
-        Some(class) => class.name().replace('_', " "),
-        None => "failed".into(),
-    }
-}
-
-/// What a class of endings is called, and what it means.
-pub(super) fn class_words(failure: Option<FailureClass>) -> (String, &'static str) {
-    failure.map_or(("success".into(), "the task was solved"), |class| (class.name().replace('_', " "), class.words()))
 }
 
 /// What stands still: obstacles, and the marks of where objects are to be.

@@ -1,6 +1,5 @@
 //! What happened when: phases of the demonstrator, contacts, milestones; times in control steps.
 
-use super::episode::moments;
 use crate::demo::{Contacts, Episode};
 use crate::joints::Joints;
 use serde_json::{Value, json};
@@ -29,7 +28,7 @@ pub(super) fn touches(episode: &Episode) -> Vec<Value> {
     let objects = &episode.scene.task.objects;
     let mut all = Vec::new();
     let mut add = |kind: &str, name: String, holds: &dyn Fn(&Contacts) -> bool| {
-        let found = spans(moments(episode).map(|step| holds(&step.contacts).then_some(())));
+        let found = spans(episode.moments().map(|step| holds(&step.contacts).then_some(())));
         if !found.is_empty() {
             let spans: Vec<(usize, usize)> = found.into_iter().map(|(from, to, ())| (from, to)).collect();
             all.push(json!({ "kind": kind, "name": name, "spans": spans }));
@@ -55,7 +54,7 @@ pub(super) fn touches(episode: &Episode) -> Vec<Value> {
 /// When a condition holds that did not before, the first time; those that hold from the start are none.
 pub(super) fn milestones(episode: &Episode) -> Vec<(usize, String)> {
     let first = |k: usize| {
-        let holds: Vec<bool> = moments(episode).map(|step| step.conditions[k]).collect();
+        let holds: Vec<bool> = episode.moments().map(|step| step.conditions[k]).collect();
         (1..holds.len()).find(|t| holds[*t] && !holds[t - 1]).filter(|_| !holds[0])
     };
     let names = episode.scene.task.condition_names();

@@ -1,9 +1,9 @@
 //! What the dynamics network expected, some steps before, of every moment.
 
-use super::episode::moments;
 use crate::demo::Episode;
 use crate::learn::Dynamics;
 use crate::state::{Pose, State};
+use rayon::prelude::*;
 
 /// Of each moment t: positions of the joints and a pose of each object as the network has them after open loop from the recorded state of `ahead` steps
 /// before (at the start of the episode, from its first) with the commands that were executed.
@@ -18,7 +18,7 @@ pub struct Ghost {
 impl Ghost {
     /// By a network of the episode's robot and task.
     pub fn new(episode: &Episode, dynamics: &Dynamics, ahead: usize) -> Self {
-        let states: Vec<Vec<f32>> = moments(episode).map(|step| step.state.to_row()).collect();
+        let states: Vec<Vec<f32>> = episode.moments().map(|step| step.state.to_row()).collect();
         let executed: Vec<Vec<f32>> =
             episode.steps.iter().map(|step| step.executed.iter().map(|v| *v as f32).collect()).collect();
         let expected = |t: usize| {
@@ -29,7 +29,7 @@ impl Ghost {
                 if next.iter().all(|v| v.is_finite()) { next } else { state }
             })
         };
-        Ghost { ahead, rows: (0..states.len()).map(|t| row(episode, t, &expected(t))).collect() }
+        Ghost { ahead, rows: (0..states.len()).into_par_iter().map(|t| row(episode, t, &expected(t))).collect() }
     }
 }
 

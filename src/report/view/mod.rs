@@ -10,11 +10,12 @@ mod events;
 mod ghost;
 mod pack;
 mod parts;
+mod shown;
 
 pub use atlas::{Atlas, Start};
 pub use ghost::Ghost;
+pub use shown::Shown;
 
-use crate::demo::Episode;
 use crate::error::Result;
 use crate::report::chart::escaped;
 use crate::report::render::{self, camera, raster};
@@ -37,19 +38,6 @@ const SCRIPT: [&str; 9] = [
     include_str!("page/atlas.js"),
     include_str!("page/main.js"),
 ];
-
-/// An episode that the page shows.
-#[derive(Clone, Debug)]
-pub struct Shown {
-    /// What it is called, short.
-    pub name: String,
-    /// Who acted, or what else tells it from the others.
-    pub about: String,
-    /// What happened.
-    pub episode: Episode,
-    /// What the dynamics network expected.
-    pub ghost: Option<Ghost>,
-}
 
 /// The page: the same bytes on every run.
 ///

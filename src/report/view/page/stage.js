@@ -1,8 +1,8 @@
 // The scene: which episodes are seen where, and what is drawn of each.
 
 const LOOKS = {
-  light: { back: [246, 247, 249], rule: [223, 227, 233], table: [226, 221, 212], line: -0.07, shade: 0.34, lift: 1 },
-  dark: { back: [14, 17, 22], rule: [39, 45, 55], table: [62, 66, 74], line: 0.20, shade: 0.50, lift: 1.18 },
+  light: { back: [246, 247, 249], table: [226, 221, 212], line: -0.07, shade: 0.34, lift: 1 },
+  dark: { back: [14, 17, 22], table: [62, 66, 74], line: 0.20, shade: 0.50, lift: 1.18 },
 };
 /** Colours by which episodes in one picture are told apart. */
 const OWN = ["#4c8dff", "#ff8c42", "#2fb67c", "#c77dff", "#e5b93c", "#ff5d73", "#38c6d9", "#9aa4b2", "#b08968"];
@@ -26,7 +26,7 @@ class Stage {
   look() {
     const look = LOOKS[dark.matches ? "dark" : "light"];
     const shares = rgb => rgb.map(v => v / 255);
-    return { ...look, back: shares(look.back), rule: shares(look.rule), table: shares(look.table) };
+    return { ...look, back: shares(look.back), table: shares(look.table) };
   }
 
   /** The canvas has as many pixels as the screen, up to twice as many as CSS has. */
@@ -62,7 +62,7 @@ class Stage {
   /** First all shadows: to go back and forth between pictures costs more than to draw them. */
   paint(scenes, look, camera) {
     scenes.forEach((scene, i) => this.painter.shadows(i, scene));
-    this.painter.wipe(look.rule);
+    this.painter.wipe(look.back);
     scenes.forEach((scene, i) => {
       const place = this.places[i];
       this.painter.scene(i, place, camera.of(place[2], place[3]), look, scene);
