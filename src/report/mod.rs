@@ -1,4 +1,4 @@
-//! Reports for people: pictures of episodes, charts, statistics over seeds, tables on a terminal, and pages of finished experiments.
+//! Reports for people: pictures of episodes, pages to look at them, charts, statistics over seeds, tables on a terminal, and pages of finished experiments.
 
 pub mod chart;
 pub mod experiments;
