@@ -39,7 +39,7 @@
 //! - [`export`]: policies for programs that are not hilt
 //! - [`serve`]: policies and worlds over a wire, for programs of others; and theirs for hilt
 //! - [`experiment`]: grids of runs as steps; starts no process
-//! - [`report`]: pictures, charts, tables, statistics over seeds, pages of experiments
+//! - [`report`]: pictures, pages to look at episodes, charts, tables, statistics over seeds, pages of experiments
 //! - [`cmd`]: the command line
 #![warn(missing_docs)]
 

@@ -70,8 +70,8 @@ fn a_drawing_is_of_the_format_that_its_name_says() {
         ok(dir.path(), &[&["render", RECORDING, "--out", name], &small[..]].concat());
         assert!(fs::read(dir.path().join(name)).expect("drawn").starts_with(head), "{name}");
     }
-    refused(dir.path(), &["render", RECORDING, "--out", "a.bmp"], 2, &["--gif, --png, or --out"]);
-    refused(dir.path(), &["render", RECORDING], 2, &["--gif, --png, or --out"]);
+    refused(dir.path(), &["render", RECORDING, "--out", "a.bmp"], 2, &["--gif, --png or --html, or --out"]);
+    refused(dir.path(), &["render", RECORDING], 2, &["--gif, --png or --html, or --out"]);
     refused(dir.path(), &["render", RECORDING, "--gif", "--out", "a.png"], 2, &["its name must end in .gif"]);
     refused(dir.path(), &["render", RECORDING, "--gif", "--png"], 2, &["cannot be used with"]);
 }

@@ -1,5 +1,5 @@
-//! Reports for people: pictures of episodes, charts, curves of training, statistics over seeds, tables on a terminal, runs beside each other, and
-//! pages of finished experiments.
+//! Reports for people: pictures of episodes, pages to look at them, charts, curves of training, statistics over seeds, tables on a terminal, runs
+//! beside each other, and pages of finished experiments.
 
 pub mod chart;
 pub mod compare;
