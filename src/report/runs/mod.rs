@@ -3,6 +3,7 @@
 //! An artefact is known by what it says of itself, not by its name, and belongs to a run when the next stage says that it was made from it.
 
 mod artefacts;
+mod beside;
 mod list;
 mod run;
 mod stamp;
@@ -10,6 +11,7 @@ mod standing;
 mod words;
 
 pub use artefacts::{Artefact, artefacts, is_run};
-pub use list::{Row, list, to_json as list_json, to_text as list_text};
+pub use beside::{list_json, list_text};
+pub use list::{Row, list};
 pub use run::{Judged, Run};
 pub use standing::{Condition, Standing};
