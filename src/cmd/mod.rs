@@ -6,6 +6,7 @@ mod common;
 mod compare;
 mod completions;
 mod console;
+mod content;
 mod context;
 mod convert;
 mod dataset;
