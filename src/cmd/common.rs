@@ -73,12 +73,11 @@ impl SettingsArgs {
         let unsaid = self.task.is_none() && self.pipeline.is_none();
         let made_for = artefact.filter(|_| unsaid).map(|(path, kind)| MadeFor::read(path, kind)).transpose()?;
         let robot = self.robot.clone().or_else(|| made_for.as_ref()?.robot.clone());
-        let read = |said: &str| ChosenTask::read(said).map_err(|why| Error::Usage(format!("--task: {why}")));
         let source = match (&self.pipeline, self.task.as_deref().or(made_for.as_ref().map(|made| made.task.as_str()))) {
-            (Some(path), said) => Source::File(path.clone(), said.map(read).transpose()?),
+            (Some(path), said) => Source::File(path.clone(), said.map(task_said).transpose()?),
             // A task's file is a pipeline file.
             (None, Some(said)) if self.preset.is_none() && config::is_file(said) => Source::File(said.into(), None),
-            (None, Some(said)) => Source::BuiltIn(read(said)?, self.preset.unwrap_or_default()),
+            (None, Some(said)) => Source::BuiltIn(task_said(said)?, self.preset.unwrap_or_default()),
             (None, None) => {
                 let tasks = built_in::names().join(", ");
                 return Err(Error::Usage(format!("which task? give --task ({tasks}, or a file) or --pipeline FILE")));
@@ -95,8 +94,7 @@ impl SettingsArgs {
     /// # Errors
     /// [`Error::Usage`] when there is none of this name.
     pub fn task(&self) -> Result<Option<ChosenTask>> {
-        let read = |said: &str| ChosenTask::read(said).map_err(|why| Error::Usage(format!("--task: {why}")));
-        self.task.as_deref().map(read).transpose()
+        self.task.as_deref().map(task_said).transpose()
     }
 
     /// The settings of learning from a dataset of another program in `dir`.
@@ -132,6 +130,11 @@ impl SettingsArgs {
         let provenance = Provenance::new(stage.name(), &pipeline.task.name, pipeline.to_json(stage)?, self.seed);
         Ok(inputs.iter().fold(provenance, |provenance, (role, content)| provenance.with_input(role, content)))
     }
+}
+
+/// The task of `--task`.
+fn task_said(said: &str) -> Result<ChosenTask> {
+    ChosenTask::read(said).map_err(|why| Error::Usage(format!("--task: {why}")))
 }
 
 /// The words of a text; blanks inside brackets, braces and quotes separate nothing.

@@ -62,19 +62,19 @@ pub struct Point {
     pub singles: Vec<f64>,
 }
 
-// Sizes in pixels.
-const PLOT_WIDTH: f64 = 280.0;
+// Sizes in pixels; [`super::Panels`] has those that are its own.
+pub(super) const PLOT_WIDTH: f64 = 280.0;
 const PLOT_HEIGHT: f64 = 260.0;
-const LEFT: f64 = 68.0;
-const RIGHT: f64 = 12.0;
-const TOP: f64 = 92.0;
-const BOTTOM: f64 = 40.0;
+pub(super) const LEFT: f64 = 68.0;
+pub(super) const RIGHT: f64 = 12.0;
+pub(super) const TOP: f64 = 92.0;
+pub(super) const BOTTOM: f64 = 40.0;
 /// Between two rows of panels, for ticks, label and title.
 const BETWEEN: f64 = 82.0;
 /// Under the last row, for ticks and label.
 const UNDER: f64 = 38.0;
 /// Right of each panel, for the next one's numbers, beside the names at the ends of its lines.
-const GAP: f64 = 62.0;
+pub(super) const GAP: f64 = 62.0;
 /// Series stand this far apart at the same category, so that their intervals can be told apart; more would make lines cross that do not.
 const DODGE: f64 = 4.0;
 /// Single observations stand this far right of their value.
@@ -84,7 +84,7 @@ const FEW_MARKERS: usize = 6;
 /// The last point is the last marker, however its place is rounded.
 const ROUNDING: f64 = 1e-9;
 /// Panels in a row.
-const COLUMNS: usize = 3;
+pub(super) const COLUMNS: usize = 3;
 
 impl Chart {
     /// The picture. Each value is one element of class `mean` with its interval of class `interval`, each observation one of class `single`;

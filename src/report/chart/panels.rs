@@ -1,5 +1,6 @@
 //! Panels of lines, each with a vertical axis of its own, over parts that are equally wide.
 
+use super::lines::{BOTTOM, COLUMNS, GAP, LEFT, PLOT_WIDTH, RIGHT, TOP};
 use super::picture::{Picture, legend, marker, names_at, stroke, text, width_of, width_with};
 use super::scale::{Axis, Scale};
 use std::fmt::Write;
@@ -43,17 +44,10 @@ pub struct FreeLine {
     pub points: Vec<[f64; 2]>,
 }
 
-// Sizes in pixels, those of line charts.
-const PLOT_WIDTH: f64 = 280.0;
+// Sizes in pixels, where they are not those of line charts.
 const PLOT_HEIGHT: f64 = 170.0;
-const LEFT: f64 = 68.0;
-const RIGHT: f64 = 12.0;
-const TOP: f64 = 92.0;
-const BOTTOM: f64 = 40.0;
 const BETWEEN: f64 = 62.0;
 const UNDER: f64 = 26.0;
-const GAP: f64 = 62.0;
-const COLUMNS: usize = 3;
 /// Markers of a line, by which it is known in grey.
 const MARKERS: usize = 4;
 
