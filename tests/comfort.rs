@@ -63,6 +63,49 @@ fn the_task_and_the_robot_are_those_of_the_artefact() {
 }
 
 #[test]
+fn what_a_hilt_toml_says_counts_below_it_and_flags_win() {
+    let dir = tempfile::tempdir().expect("a directory");
+    let below = dir.path().join("a/b");
+    fs::create_dir_all(&below).expect("made");
+    let write = |text: &str| fs::write(dir.path().join("hilt.toml"), text).expect("written");
+    let train = |words: &[&str], key: &str| {
+        let said = ok(&below, &[&["settings"], words].concat());
+        let value = said.lines().find_map(|line| line.strip_prefix(&format!("{key} = ")).map(String::from));
+        value.unwrap_or_else(|| panic!("{key} in {said}"))
+    };
+    write("task = \"stack\"\nrobot = \"panda\"\n[train]\ntau = 0.07\nrho = 0.4\n");
+    assert_eq!((train(&[], "tau"), train(&[], "robot")), ("0.07".into(), "\"panda\"".into()));
+    assert_eq!(train(&["--task", "pick-up", "--robot", "jaco"], "tau"), "0.07", "flags change what they say alone");
+    assert_eq!(train(&["--preset", "paper", "--set", "train.rho=0.1"], "rho"), "0.1");
+    // All settings are said, or none is to be looked for: make and experiments do the one and the other.
+    let whole = concat!(env!("CARGO_MANIFEST_DIR"), "/pipelines/stack.toml");
+    for words in [&["--pipeline", whole][..], &["--config", "none", "--task", "stack"]] {
+        assert_ne!(train(words, "tau"), "0.07", "{words:?}");
+    }
+    let own = dir.path().join("hilt.toml").display().to_string();
+    assert_eq!(train(&["--pipeline", whole, "--config", &own], "tau"), "0.07");
+    let said = String::from_utf8(hilt(&below, &["settings"]).stderr).expect("UTF-8");
+    assert!(said.contains(&format!("settings: also those of {own}")), "{said}");
+
+    // An artefact says its task and robot better; one of a task of a file is found by the file.
+    let evaluate = |words: &[&str]| ok(&below, &[&["evaluate", "--episodes", "1", "--json"], words].concat());
+    let said: Value = serde_json::from_str(&evaluate(&["--policy", POLICY])).expect("JSON");
+    assert_eq!(said["task"], "pick-up");
+    write(&format!("task = \"{COFFEE}\"\n[evaluate]\nepisodes = 1\n"));
+    ok(&below, &["plan", "--episodes", "1", "--out", "coffee.parquet"]);
+    ok(&below, &["simulate", "--plans", "coffee.parquet", "--out", "coffee"]);
+
+    write("[train]\nepoch = 7\n");
+    refused(&below, &["settings", "--task", "stack"], 2, &["hilt.toml: unknown key train.epoch", "did you mean train.epochs?"]);
+    refused(&below, &["doctor"], 1, &["1 of"]);
+    ok(&below, &["settings", "--task", "stack", "--config", "none"]);
+    refused(&below, &["settings", "--task", "stack", "--config", "missing.toml"], 1, &["missing.toml"]);
+    write("task = \"stack\"\n");
+    // No output of a command may take its place.
+    refused(&below, &["plan", "--episodes", "1", "--out", "../../hilt.toml"], 2, &["hilt.toml"]);
+}
+
+#[test]
 fn a_drawing_is_of_the_format_that_its_name_says() {
     let dir = tempfile::tempdir().expect("a directory");
     let small = ["--width", "64", "--height", "48", "--every", "50"];
@@ -145,7 +188,7 @@ fn a_doctor_names_everything_it_looks_at() {
     let dir = tempfile::tempdir().expect("a directory");
     let said: Value = serde_json::from_slice(&hilt(dir.path(), &["doctor", "--json"]).stdout).expect("JSON");
     let what: Vec<&str> = said.as_array().expect("a list").iter().filter_map(|f| f["what"].as_str()).collect();
-    assert_eq!(what, ["cores", "kernel", "memory", "runs", "disk", "terminal", "make", "cargo", "python", "browser", "rerun"]);
+    assert_eq!(what, ["cores", "kernel", "memory", "runs", "disk", "terminal", "settings", "make", "cargo", "python", "browser", "rerun"]);
     assert!(!dir.path().join("runs").exists(), "it only looks");
     fs::write(dir.path().join("file"), "").expect("written");
     refused(dir.path(), &["doctor", "--dir", "file/below"], 1, &["bad for hilt here"]);

@@ -260,7 +260,7 @@ fn bad_input_is_refused_and_nothing_is_lost() {
     replay(&[good, "--policy", "planner", "--noise", "-1"], 2, "a variance must be 0 to 1");
     replay(&[good, "--policy", "planner", "--at", "1", "--horizon", "5"], 2, "--horizon 5");
     replay(&[good, "--policy", "planner", "--at", "5"], 2, "the fingers are on block");
-    replay(&[good, "--policy", path(&policy)], 1, "was made for task pick-up");
+    replay(&[good, "--policy", path(&policy)], 1, "was made for task pick-up, but the recording is of task stack\n");
     replay(&[good, "--policy", "missing.safetensors"], 1, "missing.safetensors");
     replay(&[good, "--policy", "planner", "--out", good], 2, "which this command reads");
     replay(&[good, "--policy", "planner", "--out", "noise.mcap"], 2, "noise.mcap");

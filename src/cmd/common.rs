@@ -1,17 +1,14 @@
 //! The flags that all stages share: which settings, which seed.
 
+use super::Console;
 use super::made_for::MadeFor;
 use super::places::Places;
-use crate::config::{self, ChosenTask, LearningSettings, Pipeline, Preset, Source, Stage};
+use crate::config::{self, ChosenTask, LearningSettings, Pipeline, Preset, ProjectFile, Source, Stage};
 use crate::data::origin::Kind;
-use crate::data::{ContentHash, Provenance, weights};
+use crate::data::{ContentHash, Provenance};
 use crate::error::{Error, Result};
-use crate::layout::Layout;
 use crate::plan::check_ready_pose;
 use crate::task::built_in;
-use crate::tasks::with_layout;
-use crate::tensor::NamedTensor;
-use serde_json::Value;
 use std::path::{Path, PathBuf};
 
 /// Where artefacts go unless a flag says otherwise.
@@ -33,6 +30,10 @@ pub struct SettingsArgs {
     /// with the mends that lift hil above bc) [default: best]
     #[arg(long, value_name = "PRESET", conflicts_with = "pipeline")]
     preset: Option<Preset>,
+    /// What is said once for a directory instead of with every command: a hilt.toml, or none [default: hilt.toml here or in a directory above,
+    /// but none with --pipeline]
+    #[arg(long, value_name = "FILE|none")]
+    config: Option<PathBuf>,
     /// Override one setting, in TOML; may be repeated (--set plan.speed=0.5 --set scene.yaw=true)
     #[arg(long, value_name = "STAGE.KEY=VALUE")]
     set: Vec<String>,
@@ -44,6 +45,8 @@ pub struct SettingsArgs {
     pub seed: u64,
 }
 
+/// What `--config` says for no file.
+const NO_CONFIG: &str = "none";
 /// The key of a provenance's settings that says that what was learned from is a dataset of another program, and which columns.
 pub const FOREIGN: &str = "columns";
 
@@ -51,10 +54,29 @@ pub const FOREIGN: &str = "columns";
 pub type Flag<'a> = (&'a str, Option<String>);
 
 impl SettingsArgs {
-    /// What these settings are read from, where that is a file.
-    pub fn places(&self) -> Places {
+    /// What these settings are read from, where that is a file; says which `hilt.toml` counts, where one does.
+    pub fn places(&self, console: &Console) -> Places {
+        let project = self.project_file();
+        if let Some(project) = &project {
+            console.say(&format!("settings: also those of {}", project.display()));
+        }
         let said = [self.robot.as_deref(), self.task.as_deref()].into_iter().flatten().map(Path::new);
-        Places::new().read_all(self.pipeline.as_deref().into_iter().chain(said.filter(|path| path.is_file())))
+        let files = self.pipeline.as_deref().into_iter().chain(project.as_deref()).chain(said.filter(|path| path.is_file()));
+        Places::new().read_all(files)
+    }
+
+    /// The `hilt.toml` that counts here. A pipeline file says every setting, so that with it none does unless it is named.
+    fn project_file(&self) -> Option<PathBuf> {
+        match &self.config {
+            Some(none) if none.as_os_str() == NO_CONFIG => None,
+            Some(file) => Some(file.clone()),
+            None if self.pipeline.is_some() => None,
+            None => ProjectFile::above(&std::env::current_dir().ok()?),
+        }
+    }
+
+    fn project(&self) -> Result<Option<ProjectFile>> {
+        self.project_file().map(|file| ProjectFile::read(&file)).transpose()
     }
 
     /// The resolved settings; `flags` are dotted keys with the values of the stage's own flags, where given.
@@ -65,28 +87,43 @@ impl SettingsArgs {
         self.resolve_from(None, flags)
     }
 
-    /// As [`SettingsArgs::resolve`]; where neither task nor pipeline file is given, task and robot are those that an artefact was made for.
+    /// As [`SettingsArgs::resolve`]; where no flag says the task, task and robot are those that an artefact was made for.
     ///
     /// # Errors
     /// Also what reading the artefact returns.
     pub fn resolve_from(&self, artefact: Option<(&Path, Kind)>, flags: &[Flag]) -> Result<Pipeline> {
-        let unsaid = self.task.is_none() && self.pipeline.is_none();
-        let made_for = artefact.filter(|_| unsaid).map(|(path, kind)| MadeFor::read(path, kind)).transpose()?;
-        let robot = self.robot.clone().or_else(|| made_for.as_ref()?.robot.clone());
-        let source = match (&self.pipeline, self.task.as_deref().or(made_for.as_ref().map(|made| made.task.as_str()))) {
-            (Some(path), said) => Source::File(path.clone(), said.map(task_said).transpose()?),
+        let project = self.project()?;
+        let said = project.as_ref();
+        let file = self.pipeline_file(said);
+        let unsaid = self.task.is_none() && file.is_none();
+        let own_task = said.and_then(|project| project.task.clone());
+        let made_for = match artefact.filter(|_| unsaid) {
+            Some((path, kind)) => Some(MadeFor::read(path, kind, own_task.as_deref())?),
+            None => None,
+        };
+        let made = made_for.as_ref();
+        let task = self.task.clone().or_else(|| made.map(|made| made.task.clone())).or(own_task);
+        let robot = self.robot.clone().or_else(|| made?.robot.clone()).or_else(|| said?.robot.clone());
+        let preset = self.preset.or_else(|| said?.preset);
+        let source = match (file, task.as_deref()) {
+            (Some(path), said) => Source::File(path, said.map(task_said).transpose()?),
             // A task's file is a pipeline file.
-            (None, Some(said)) if self.preset.is_none() && config::is_file(said) => Source::File(said.into(), None),
-            (None, Some(said)) => Source::BuiltIn(task_said(said)?, self.preset.unwrap_or_default()),
+            (None, Some(said)) if preset.is_none() && config::is_file(said) => Source::File(said.into(), None),
+            (None, Some(said)) => Source::BuiltIn(task_said(said)?, preset.unwrap_or_default()),
             (None, None) => {
                 let tasks = built_in::names().join(", ");
                 return Err(Error::Usage(format!("which task? give --task ({tasks}, or a file) or --pipeline FILE")));
             }
         };
         let (sets, given) = self.overrides([&("robot", robot)].into_iter().chain(flags));
-        let pipeline = Pipeline::load(&source, &sets).map_err(|e| in_words_of_flags(e, &given))?;
+        let pipeline = Pipeline::load_with(&source, said, &sets).map_err(|e| in_words_of_flags(e, &given))?;
         check_ready_pose(&pipeline.robot, &pipeline.scene)?;
         Ok(pipeline)
+    }
+
+    /// The pipeline file, unless a preset is asked for in its place.
+    fn pipeline_file(&self, project: Option<&ProjectFile>) -> Option<PathBuf> {
+        self.pipeline.clone().or_else(|| project.filter(|_| self.preset.is_none())?.pipeline.clone())
     }
 
     /// The task that is given, if one is.
@@ -109,7 +146,10 @@ impl SettingsArgs {
             }
         }
         let (sets, given) = self.overrides(flags.iter());
-        let loaded = LearningSettings::load(self.preset.unwrap_or_default(), self.pipeline.as_deref(), &sets);
+        let project = self.project()?;
+        let preset = self.preset.or_else(|| project.as_ref()?.preset).unwrap_or_default();
+        let file = self.pipeline_file(project.as_ref());
+        let loaded = LearningSettings::load(preset, file.as_deref(), project.as_ref(), &sets);
         loaded.map_err(|e| in_words_of_flags(e, &given))
     }
 
@@ -176,93 +216,6 @@ fn in_words_of_flags(error: Error, given: &[(String, String)]) -> Error {
 pub fn path_or(given: Option<&Path>, pipeline: &Pipeline, name: &str) -> PathBuf {
     let robot = if pipeline.robot.is_default() { "" } else { pipeline.robot.name.as_str() };
     given.map_or_else(|| Path::new(RUNS).join(robot).join(&pipeline.task.name).join(name), Path::to_path_buf)
-}
-
-/// Refuses an input that was made for another task, or for one of the same name that says something else.
-///
-/// # Errors
-/// [`Error::Input`] naming both tasks.
-pub fn same_task(path: &Path, made: &Provenance, pipeline: &Pipeline) -> Result<()> {
-    let (theirs, ours) = (&made.task, &pipeline.task.name);
-    if made.settings.get(FOREIGN).is_some() {
-        return Err(Error::input(
-            path,
-            format!(
-                "was learned from {theirs}, a dataset of another program, not from demos of {ours}: hilt has no simulator for it"
-            ),
-        ));
-    }
-    if theirs != ours {
-        return Err(Error::input(
-            path,
-            format!("was made for task {theirs}, but task {ours} is asked for; give --task {theirs} or another file"),
-        ));
-    }
-    // The paper's tasks leave it unsaid.
-    let same = match made.settings["task"]["content"].as_str() {
-        None => pipeline.task.is_of_the_paper(),
-        Some(content) => content == pipeline.task.content(),
-    };
-    if same {
-        return Ok(());
-    }
-    Err(Error::input(path, format!("was made for another task of the name {ours}: its file has changed since; make it anew")))
-}
-
-/// A network of the robot and task of `pipeline` from its weights: `make` makes it of their tensors and description, `layout` says what its rows hold.
-///
-/// # Errors
-/// What reading returns; [`Error::Input`] for weights of another task, kind or layout, or that are no such network.
-pub fn read_network<N>(
-    path: &Path,
-    kind: &str,
-    pipeline: &Pipeline,
-    make: fn(&[NamedTensor], &Value) -> std::result::Result<N, String>,
-    layout: fn(&N) -> &Layout,
-) -> Result<(N, Provenance, ContentHash)> {
-    let (tensors, description, made, content) = weights::read_hashed(path, kind)?;
-    same_task(path, &made, pipeline)?;
-    let network = make(&tensors, &with_layout(description)).map_err(|why| Error::input(path, why))?;
-    same_layout(path, &made, layout(&network), pipeline)?;
-    Ok((network, made, content))
-}
-
-/// Refuses what another robot made; what does not say by whom was made by the Jaco, when there was no other.
-///
-/// # Errors
-/// [`Error::Input`] naming both.
-pub fn same_robot(path: &Path, made: &Provenance, pipeline: &Pipeline) -> Result<()> {
-    let theirs = &made.settings["robot"];
-    let same = match theirs["content"].as_str() {
-        None => pipeline.robot.is_default(),
-        Some(content) => content == pipeline.robot.content(),
-    };
-    if same {
-        return Ok(());
-    }
-    let (theirs, ours) = (theirs["name"].as_str().unwrap_or("jaco"), &pipeline.robot.name);
-    let hint = if theirs == ours { ", or its files have changed since".to_string() } else { format!("; give --robot {theirs}") };
-    Err(Error::input(path, format!("was made by robot {theirs}, but {ours} is asked for{hint}, or make it anew")))
-}
-
-/// Refuses rows that are not those of the robot in the task: by the names of the robots that made them, where those differ.
-///
-/// # Errors
-/// [`Error::Input`] with the robots, or the numbers of both.
-pub fn same_layout(path: &Path, made: &Provenance, layout: &Layout, pipeline: &Pipeline) -> Result<()> {
-    let ours = pipeline.task.layout(&pipeline.robot);
-    if *layout == *ours {
-        return Ok(());
-    }
-    same_robot(path, made, pipeline)?;
-    let [theirs, ours] =
-        [layout, &*ours].map(|l| format!("states of {} numbers and actions of {}", l.state_dim(), l.action_dim()));
-    let robot = &pipeline.robot.name;
-    let advice = "give --robot, or make it anew";
-    Err(Error::input(
-        path,
-        format!("has {theirs}; {robot} in this task has {ours}, or in another order (\"layout\" says which): {advice}"),
-    ))
 }
 
 #[cfg(test)]

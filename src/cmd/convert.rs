@@ -1,4 +1,5 @@
-use super::common::{SettingsArgs, path_or, same_robot, same_task};
+use super::common::{SettingsArgs, path_or};
+use super::fits::{same_robot, same_task};
 use super::places::Content;
 use super::{Console, Context, Outcome, Progress, dropped};
 use crate::config::{Pipeline, Stage};
@@ -52,7 +53,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome> {
     let pipeline = args.settings.resolve_from(args.recordings.as_deref().map(|dir| (dir, Kind::Recordings)), &[])?;
     let dir = path_or(args.recordings.as_deref(), &pipeline, "recordings");
     let out = path_or(args.out.as_deref(), &pipeline, "dataset");
-    args.settings.places().read(&dir).write("--out", &out, Content::Datasets).check(&context.console)?;
+    args.settings.places(&context.console).read(&dir).write("--out", &out, Content::Datasets).check(&context.console)?;
     let files = recording::files(&dir)?;
     if files.is_empty() {
         return Err(Error::input(&dir, "holds no recording (episode-00000.mcap, ...); run `hilt simulate` first"));

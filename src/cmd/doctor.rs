@@ -1,5 +1,6 @@
 use super::places::Places;
 use super::{Context, Outcome, output};
+use crate::config::ProjectFile;
 use crate::data::atomic;
 use crate::error::{Error, Result};
 use crate::nn::kernel;
@@ -51,7 +52,7 @@ struct Finding {
 pub fn run(args: &Args, context: &Context) -> Result<Outcome> {
     Places::new().check(&context.console)?;
     let findings: Vec<Finding> =
-        [processor(), vec![memory()], disk(&args.dir), vec![terminal()], programs()].into_iter().flatten().collect();
+        [processor(), vec![memory()], disk(&args.dir), vec![terminal(), project()], programs()].into_iter().flatten().collect();
     if args.json {
         output::print_json(&findings)?;
     } else {
@@ -128,6 +129,15 @@ fn terminal() -> Finding {
     }
     let (columns, colours) = (Term::stderr().size().1, if console::colors_enabled_stderr() { "colours" } else { "no colours" });
     finding("terminal", format!("{columns} columns, {colours}"), true, (State::Ok, ""))
+}
+
+/// The `hilt.toml` that counts here, which may lie in a directory above.
+fn project() -> Finding {
+    let found = std::env::current_dir().ok().and_then(|dir| ProjectFile::above(&dir));
+    let Some(file) = found else { return finding("settings", "no hilt.toml here or above", true, (State::Ok, "")) };
+    let read = ProjectFile::read(&file);
+    let is = read.as_ref().err().map_or_else(|| file.display().to_string(), ToString::to_string);
+    finding("settings", is, read.is_ok(), (State::Bad, "mend the file, or give --config none"))
 }
 
 /// What may be of use, any of a few names, and what for.

@@ -61,7 +61,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome> {
     let pipeline = args.settings.resolve_from(artefact, &[episodes, stochastic])?;
     let path = path_or(args.policy.as_deref(), &pipeline, "policy.safetensors");
     let log = args.out.as_deref().map(|out| beside(out, "episodes.parquet"));
-    args.places(&path, log.as_deref()).check(&context.console)?;
+    args.places(&path, log.as_deref(), &context.console).check(&context.console)?;
     let Chosen { subject, content, trained, said } = Chosen::read(&path, &args.served, &pipeline, &context.interrupt)?;
     let inputs: Vec<_> = content.map(|content| ("policy", content)).into_iter().collect();
     let horizon_steps = subject.horizon_steps(&pipeline);
@@ -93,8 +93,8 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome> {
 }
 
 impl Args {
-    fn places(&self, policy: &Path, log: Option<&Path>) -> Places {
-        let mut places = self.settings.places().read_all(Chosen::file(policy)).read_all(self.served.reads());
+    fn places(&self, policy: &Path, log: Option<&Path>, console: &Console) -> Places {
+        let mut places = self.settings.places(console).read_all(Chosen::file(policy)).read_all(self.served.reads());
         if let (Some(out), Some(log)) = (&self.out, log) {
             places = places.write("--out", out, Content::Summary("evaluate"));
             places = places.write("the log of the episodes", log, Content::Table("evaluate"));

@@ -16,6 +16,7 @@ mod epochs;
 mod evaluate;
 mod experiment;
 mod export;
+mod fits;
 mod inspect;
 mod learning;
 mod listen;

@@ -1,6 +1,6 @@
 //! What `hilt view`, `hilt render --html` and `hilt evaluate --render` share: from recordings to the page.
 
-use super::common::read_network;
+use super::fits::{of_recording, read_network};
 use super::places::{Content, Places};
 use super::pretrain;
 use super::{Console, Context};
@@ -184,6 +184,7 @@ fn read(files: &[PathBuf], args: &PageArgs, context: &Context) -> Result<Vec<Sho
 fn expected(network: &Path, episode: &Episode, ahead: usize) -> Result<Ghost> {
     let mut pipeline = Pipeline::defaults(&episode.scene.task);
     pipeline.robot = episode.scene.robot.clone().into();
+    of_recording(network, pretrain::KIND, &episode.scene)?;
     let (dynamics, ..) = read_network(network, pretrain::KIND, &pipeline, Dynamics::from_tensors, |network| network.layout())?;
     Ok(Ghost::new(episode, &dynamics, ahead))
 }

@@ -46,7 +46,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome> {
             "--shard {shard}: --out {out} is no file, beside which the share could be kept; name one"
         )));
     }
-    let places = args.settings.places().write("--out", &out, Content::Table("plan"));
+    let places = args.settings.places(&context.console).write("--out", &out, Content::Table("plan"));
     let places =
         kept.iter().fold(places, |places, kept| places.write("the directory of what is unfinished", kept, Content::Pieces));
     places.check(&context.console)?;

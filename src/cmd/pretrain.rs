@@ -36,7 +36,8 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome> {
     let mut learning = Learning::of(&args.settings, &args.columns, args.dataset.as_deref(), &[])?;
     let out = learning.path_or(args.out.as_deref(), "dynamics.safetensors");
     let (errors, metrics) = (beside(&out, "errors.parquet"), beside(&out, "pretraining.parquet"));
-    let places = args.settings.places().read(&learning.dataset).write("--out", &out, Content::Weights(KIND, "pretrain"));
+    let places =
+        args.settings.places(&context.console).read(&learning.dataset).write("--out", &out, Content::Weights(KIND, "pretrain"));
     let places = places.write("the table of errors", &errors, Content::Table("pretrain"));
     places.write("the table of epochs", &metrics, Content::Table("pretrain")).check(&context.console)?;
     let Demos { mut train, validation, content } = learning.demos(&args.settings, &context.console)?;

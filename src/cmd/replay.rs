@@ -1,7 +1,8 @@
+use super::fits::of_recording;
 use super::page::who;
 use super::places::{Content, Places};
 use super::subject::{Chosen, ServedArgs, Subject};
-use super::{Context, Outcome, output};
+use super::{Context, Outcome, output, train};
 use crate::config::Pipeline;
 use crate::data::{Provenance, atomic, recording};
 use crate::demo::Episode;
@@ -64,6 +65,9 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome> {
     let (recorded, made, content) = recording::read_hashed(&args.from)?;
     let at = moment(args.at, &recorded)?;
     let pipeline = pipeline(&args.from, &recorded, &made, args.noise)?;
+    if let Some(file) = Chosen::file(&args.policy) {
+        of_recording(file, train::KIND, &recorded.scene)?;
+    }
     let Chosen { subject, content: policy, said, .. } = Chosen::read(&args.policy, &args.served, &pipeline, &context.interrupt)?;
     let (stream, pulses) = noise(&made, &pipeline);
     let horizon_steps = args.horizon.unwrap_or_else(|| subject.horizon_steps(&pipeline));

@@ -24,7 +24,7 @@ pub struct Args {
 pub fn run(args: &Args, context: &Context) -> Result<Outcome> {
     let horizon = ("evaluate.horizon_steps", args.horizon.map(|steps| steps.to_string()));
     let pipeline = args.settings.resolve(&[horizon])?;
-    args.settings.places().read_all(args.listen.reads()).check(&context.console)?;
+    args.settings.places(&context.console).read_all(args.listen.reads()).check(&context.console)?;
     let horizon_steps = match pipeline.evaluate.horizon_steps {
         0 => pipeline.simulate.max_steps,
         given => given,

@@ -20,7 +20,7 @@ pub struct Args {
 }
 
 pub fn run(args: &Args, context: &Context) -> Result<Outcome> {
-    args.settings.places().check(&context.console)?;
+    args.settings.places(&context.console).check(&context.console)?;
     if let Some(asked) = &args.explain {
         let explained = explain(asked, args.settings.task()?.as_ref())?;
         return output::print(&explained.iter().map(ToString::to_string).collect::<Vec<_>>().join("\n")).map(|()| Outcome::Done);

@@ -1,4 +1,5 @@
-use super::common::{SettingsArgs, path_or, same_robot, same_task};
+use super::common::{SettingsArgs, path_or};
+use super::fits::{same_robot, same_task};
 use super::places::Content;
 use super::shard::Shard;
 use super::unfinished::{self, Unfinished};
@@ -42,7 +43,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome> {
     let path = path_or(args.plans.as_deref(), &pipeline, "plans.parquet");
     let out = path_or(args.out.as_deref(), &pipeline, "recordings");
     let kept = unfinished::beside_dir(&out)?;
-    let places = args.settings.places().read(&path).write("--out", &out, Content::Recordings("simulate"));
+    let places = args.settings.places(&context.console).read(&path).write("--out", &out, Content::Recordings("simulate"));
     places.write("the directory of what is unfinished", &kept, Content::Pieces).check(&context.console)?;
     let plans = table_file::Reader::open(&path)?;
     same_task(&path, plans.provenance(), &pipeline)?;

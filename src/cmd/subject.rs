@@ -1,6 +1,6 @@
 //! Who acts in an evaluation: the demonstrator, a policy, or one that somebody serves.
 
-use super::common::read_network;
+use super::fits::read_network;
 use super::train;
 use crate::config::Pipeline;
 use crate::data::ContentHash;

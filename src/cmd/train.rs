@@ -81,7 +81,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome> {
     let needs_model = args.method.needs_dynamics() || args.method == MethodName::Bc && args.dynamics.is_some();
     let kept = beside(&out, checkpoint::ENDING);
     let read = needs_demos.then_some(dir.as_path()).into_iter().chain(needs_model.then_some(model.as_path()));
-    let places = args.settings.places().read_all(read);
+    let places = args.settings.places(&context.console).read_all(read);
     let places =
         places.write("--out", &out, Content::Weights(KIND, "train")).write("--metrics", &metrics, Content::Table("train"));
     let checkpoint = if args.resume { Content::Own } else { Content::Weights(weights::CHECKPOINT, "train") };

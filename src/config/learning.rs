@@ -2,7 +2,7 @@
 
 use super::load::{extended, lay_over, put};
 use super::pipeline_file::{ROBOT, TASK, read_table};
-use super::{ConvertSettings, FeatureSet, Pipeline, Preset, PretrainSettings, Stage, TrainSettings, check};
+use super::{ConvertSettings, FeatureSet, Pipeline, Preset, PretrainSettings, ProjectFile, Stage, TrainSettings, check};
 use crate::error::{Error, Result};
 use crate::task::built_in;
 use crate::words::shown;
@@ -38,18 +38,19 @@ const KNOWN: &str = "pretrain.features = \"raw\"\npretrain.structure = \"plain\"
 const ALLOWED: &str = "convert.train_per_validation, pretrain.KEY and train.KEY";
 
 impl LearningSettings {
-    /// Defaults < `preset`, with features raw and nothing executed again < `file` < `sets`, as [`Pipeline::load`] has it. What a file says of
+    /// Defaults < `preset`, with features raw and nothing executed again < `file` < `project` < `sets`, as [`Pipeline::load`] has it. What a file says of
     /// a task, a robot and a scene is for another use of it.
     ///
     /// # Errors
     /// As [`Pipeline::load`]; [`Error::Usage`] for what asks for kinematics or a simulator.
-    pub fn load(preset: Preset, file: Option<&Path>, sets: &[String]) -> Result<Self> {
+    pub fn load(preset: Preset, file: Option<&Path>, project: Option<&ProjectFile>, sets: &[String]) -> Result<Self> {
         let origin = file.map_or_else(|| format!("preset {}", preset.name()), |path| path.display().to_string());
         let mut own = file.map(read_table).transpose()?.unwrap_or_default();
         let base = own.remove("extends").unwrap_or_else(|| preset.name().into());
         // Presets differ by task; that of none is what a preset does for a task that it does not know.
         let mut table = extended(toml::Table::from_iter([("extends".into(), base), (TASK.into(), "".into())]), &origin)?;
         lay_over(&mut table, KNOWN.parse().expect("these lines are TOML"));
+        lay_over(&mut own, project.map(|project| project.settings.clone()).unwrap_or_default());
         let set_here = |section: &str, key: &str| {
             let in_sets =
                 || sets.iter().any(|set| set.split('=').next().is_some_and(|said| said.trim() == format!("{section}.{key}")));
@@ -133,7 +134,7 @@ mod tests {
 
     fn load(preset: Preset, sets: &[&str]) -> Result<LearningSettings> {
         let sets: Vec<String> = sets.iter().map(ToString::to_string).collect();
-        LearningSettings::load(preset, None, &sets)
+        LearningSettings::load(preset, None, None, &sets)
     }
 
     #[test]

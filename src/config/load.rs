@@ -3,7 +3,7 @@
 use super::pipeline_file::{ROBOT, TASK, parsed, read_table};
 use super::ranges::Range;
 use super::robot::is_file;
-use super::{ChosenTask, Pipeline, Preset, check};
+use super::{ChosenTask, Pipeline, Preset, ProjectFile, check};
 use crate::error::{Error, Result};
 use crate::words::shown;
 use std::path::PathBuf;
@@ -27,6 +27,14 @@ impl Pipeline {
     /// [`Error::Usage`] names an unknown key and the nearest known one, or a key, its value and what is allowed;
     /// [`Error::Io`] when the file cannot be read.
     pub fn load(source: &Source, sets: &[String]) -> Result<Pipeline> {
+        Pipeline::load_with(source, None, sets)
+    }
+
+    /// The same with the sections of a `project` file over those of `source`.
+    ///
+    /// # Errors
+    /// As [`Pipeline::load`].
+    pub fn load_with(source: &Source, project: Option<&ProjectFile>, sets: &[String]) -> Result<Pipeline> {
         let (origin, mut own, task) = match source {
             Source::BuiltIn(task, preset) => {
                 let origin = format!("built-in pipeline {} ({})", task.name, preset.name());
@@ -39,6 +47,10 @@ impl Pipeline {
         agree_on_task(&mut own, task, &origin)?;
         let mut table = extended(own, &origin)?;
         let mut pipeline = check::resolve(table.clone(), &origin)?;
+        if let Some(project) = project {
+            lay_over(&mut table, project.settings.clone());
+            pipeline = check::resolve(table.clone(), &project.origin())?;
+        }
         for set in sets {
             let origin = format!("--set {}", shown(set));
             put(&mut table, set, &origin)?;

@@ -1,5 +1,5 @@
 //! Settings: one struct per stage, doc, default and unit beside each field; frozen after parsing.
-//! Precedence: defaults < pipeline file < `--set stage.key=value` < flags.
+//! Precedence: defaults < preset or pipeline file < `hilt.toml` < `--set stage.key=value` < flags.
 
 mod bc_rl;
 mod check;
@@ -13,6 +13,7 @@ mod pipeline_file;
 mod ppo;
 mod preset;
 mod pretrain;
+mod project;
 mod ranges;
 mod robot;
 mod sc;
@@ -31,6 +32,7 @@ pub use load::Source;
 pub use ppo::{PpoSettings, RewardKind};
 pub use preset::Preset;
 pub use pretrain::PretrainSettings;
+pub use project::ProjectFile;
 pub use ranges::{MOST_LAYERS, MOST_STEPS, MOST_UNITS};
 pub use robot::{ChosenRobot, is_file};
 pub use sc::ScSettings;

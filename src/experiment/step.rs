@@ -73,10 +73,11 @@ impl Step {
         self.outputs.iter().all(|output| output.path.exists())
     }
 
-    /// The whole command line behind the name of the binary.
+    /// The whole command line behind the name of the binary. No `hilt.toml` of where it runs changes a setting.
     pub fn command(&self, threads: &str) -> Vec<String> {
         let log = self.log.display().to_string();
-        let more = ["--threads", threads, "--log", log.as_str(), "--allow-dropped", "--quiet"].map(String::from);
+        let more =
+            ["--threads", threads, "--log", log.as_str(), "--config", "none", "--allow-dropped", "--quiet"].map(String::from);
         self.words.iter().cloned().chain(more).collect()
     }
 
