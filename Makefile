@@ -26,7 +26,7 @@ METHOD ?= hil
 RESUME ?=
 # Seconds between two checkpoints of training.
 CHECKPOINT ?= 60
-# 1: training writes its metrics as they come beside the policy, for hilt plot --watch RUNS/TASK.
+# 1: pretraining and training write their metrics as they come beside their weights, for hilt plot --watch RUNS/TASK.
 LIVE   ?=
 # Overrides, separated by blanks: SET="plan.speed=0.5 train.rho=0.3"; a blank inside brackets or quotes belongs to the value.
 SET    ?=
@@ -173,7 +173,7 @@ $(STAMP)/convert.toml: $(STAMP)/simulate.toml
 
 $(STAMP)/pretrain.toml: $(STAMP)/convert.toml
 	@$(MADE) start pretrain $(SETTINGS)
-	$(HILT) pretrain $(FLAGS) $(call RUN,pretrain) --dataset $(DATASET) --out $(DYNAMICS)
+	$(HILT) pretrain $(FLAGS) $(call RUN,pretrain) --dataset $(DATASET) --out $(DYNAMICS)$(if $(filter 1,$(LIVE)), --live $(DYNAMICS:.safetensors=.pretraining.jsonl))
 	@$(MADE) done pretrain
 
 $(STAMP)/train$(OF).toml: $(LEARNS_FROM:%=$(STAMP)/%.toml)

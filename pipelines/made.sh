@@ -169,7 +169,7 @@ clean() {
     for method in '' -bc -sc -ppo -bc-rl; do
         rm -f "policy$method".{safetensors,checkpoint.safetensors,training.parquet,training.jsonl} "evaluation$method".{json,parquet,episodes.parquet}
     done
-    rm -f plans.parquet dynamics.{safetensors,parquet,errors.parquet,pretraining.parquet} {pre,}training.parquet episode-00000.png
+    rm -f plans.parquet dynamics.{safetensors,parquet,errors.parquet,pretraining.parquet,pretraining.jsonl} {pre,}training.parquet episode-00000.png
     rm -rf {plans,recordings}.unfinished/{run-*,.hilt-*}
     rm -f recordings/episode-*.mcap logs/{plan,simulate,convert,pretrain,train{,-bc,-sc,-ppo,-bc-rl},evaluate{,-bc,-sc,-ppo,-bc-rl}}.log
     rm -f dataset/{train,validation}/{meta/{info.json,stats.json,tasks.parquet},{data,meta/episodes}/chunk-*/file-*.parquet}

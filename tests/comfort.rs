@@ -188,7 +188,10 @@ fn a_doctor_names_everything_it_looks_at() {
     let dir = tempfile::tempdir().expect("a directory");
     let said: Value = serde_json::from_slice(&hilt(dir.path(), &["doctor", "--json"]).stdout).expect("JSON");
     let what: Vec<&str> = said.as_array().expect("a list").iter().filter_map(|f| f["what"].as_str()).collect();
-    assert_eq!(what, ["cores", "kernel", "memory", "runs", "disk", "terminal", "settings", "make", "cargo", "python", "browser", "rerun"]);
+    assert_eq!(
+        what,
+        ["cores", "kernel", "memory", "runs", "disk", "terminal", "settings", "make", "cargo", "python", "browser", "rerun"]
+    );
     assert!(!dir.path().join("runs").exists(), "it only looks");
     fs::write(dir.path().join("file"), "").expect("written");
     refused(dir.path(), &["doctor", "--dir", "file/below"], 1, &["bad for hilt here"]);

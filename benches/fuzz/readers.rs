@@ -2,8 +2,8 @@
 
 use super::mutate::{self, one_in, pick};
 use super::{recordings, sources, structure};
-use hilt::config::{Pipeline, Source};
-use hilt::data::{ContentHash, dataset, inspect, json_file, recording, seal, table_file, weights};
+use hilt::config::{Pipeline, ProjectFile, Source};
+use hilt::data::{ContentHash, dataset, inspect, json_file, live_file, recording, seal, table_file, weights};
 use hilt::error::{Error, Result};
 use hilt::interrupt::Interrupt;
 use hilt::learn::{Checkpoint, Dynamics, Policy};
@@ -22,7 +22,8 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
 
 /// Every reader.
-pub const NAMES: [&str; 8] = ["recording", "plans", "dataset", "policy", "dynamics", "checkpoint", "summary", "settings"];
+pub const NAMES: [&str; 10] =
+    ["recording", "plans", "dataset", "policy", "dynamics", "checkpoint", "summary", "metrics", "project", "settings"];
 /// One input in so many is left without a right seal.
 const UNSEALED: u32 = 16;
 /// Words for `--set`.
@@ -105,9 +106,20 @@ impl Reader {
                 let content = json!({ "success_rate": 0.5, "wilson_95": [0.1, 0.9], "failures": { "dropped": 1 } });
                 self.whole = json_file::encode(Path::new("summary"), &content, &made).expect("a summary");
             }
+            "metrics" => {
+                let line =
+                    |epoch| live_file::line("hil", [epoch, 9], 20 * epoch, [("l_bc", 0.5), ("l_sc", f64::NAN)].into_iter());
+                self.whole = (1..10).map(line).collect::<String>().into_bytes();
+            }
             _ => {
                 self.whole = Pipeline::defaults(&stack()).to_toml(None).expect("TOML").into_bytes();
                 self.other = self.whole.clone();
+                if self.name == "project" {
+                    // Its task is a name.
+                    let mut table: toml::Table = Pipeline::defaults(&stack()).to_toml(None).expect("TOML").parse().expect("TOML");
+                    table.insert("task".into(), "stack".into());
+                    self.whole = table.to_string().into_bytes();
+                }
             }
         }
         if let Some((tensors, meta)) = &self.network {
@@ -148,7 +160,8 @@ impl Reader {
             "policy" | "dynamics" | "checkpoint" => self.other_weights(rng),
             "summary" => structure::other_json(whole, rng),
             "dataset" if whole.starts_with(b"{") => structure::other_json(whole, rng),
-            "settings" => structure::other_toml(whole, rng),
+            "metrics" => structure::other_line(whole, rng),
+            "settings" | "project" => structure::other_toml(whole, rng),
             _ => None,
         };
         let bytes = by_structure.unwrap_or_else(|| plain(rng));
@@ -242,6 +255,8 @@ impl Reader {
                 }
             }
             "summary" => inspect(path, &Interrupt::default()).and_then(|_| json_file::read(path)).map(drop),
+            "metrics" => live_file::read(path).map(drop),
+            "project" => ProjectFile::read(path).map(drop),
             _ if number % 2 == 1 => {
                 let sets = [String::from_utf8_lossy(input).into_owned()];
                 Pipeline::load(&Source::BuiltIn(stack().into(), Default::default()), &sets).map(drop)

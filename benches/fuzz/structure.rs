@@ -39,6 +39,16 @@ pub fn other_table(table: &Table, rng: &mut ChaCha8Rng) -> Option<Vec<u8>> {
     sources::table(&table)
 }
 
+/// Lines of JSON with another value in one of them.
+pub fn other_line(text: &[u8], rng: &mut ChaCha8Rng) -> Option<Vec<u8>> {
+    let mut lines: Vec<String> = std::str::from_utf8(text).ok()?.lines().map(String::from).collect();
+    let hit = mutate::below(lines.len(), rng);
+    let mut value: Value = serde_json::from_str(&lines[hit]).ok()?;
+    mutate::value(&mut value, rng);
+    lines[hit] = value.to_string();
+    Some((lines.join("\n") + "\n").into_bytes())
+}
+
 /// JSON with another value in some place.
 pub fn other_json(whole: &[u8], rng: &mut ChaCha8Rng) -> Option<Vec<u8>> {
     let mut content: Value = serde_json::from_slice(whole).ok()?;

@@ -47,8 +47,6 @@ pub struct SettingsArgs {
 
 /// What `--config` says for no file.
 const NO_CONFIG: &str = "none";
-/// The key of a provenance's settings that says that what was learned from is a dataset of another program, and which columns.
-pub const FOREIGN: &str = "columns";
 
 /// A flag that stands for one setting.
 pub type Flag<'a> = (&'a str, Option<String>);

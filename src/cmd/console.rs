@@ -1,5 +1,6 @@
 //! Words and progress on stderr: bars on a terminal, plain lines otherwise; with `--log`, the plain lines in a file as well.
 
+use super::output::can_move;
 use crate::error::{Error, Result};
 use crate::interrupt;
 use console::{Term, style};
@@ -29,8 +30,7 @@ pub struct Console {
 impl Console {
     /// `quiet` keeps stderr for errors; [`Console::open_log`] begins the log.
     pub fn new(quiet: bool, log: Option<&Path>, goes_on: bool) -> Self {
-        // A dumb terminal cannot move its cursor.
-        let show_bars = !quiet && stderr().is_terminal() && std::env::var_os("TERM").is_some_and(|term| term != "dumb");
+        let show_bars = !quiet && stderr().is_terminal() && can_move();
         let target = if show_bars { ProgressDrawTarget::stderr() } else { ProgressDrawTarget::hidden() };
         let (log_path, log) = (log.map(Path::to_path_buf), OnceLock::new());
         Console { quiet, log_path, goes_on, log, bars: MultiProgress::with_draw_target(target) }

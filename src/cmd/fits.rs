@@ -1,6 +1,5 @@
 //! Whether an input fits: refuses what was made for another task, by another robot, or of other rows.
 
-use super::common::FOREIGN;
 use crate::config::Pipeline;
 use crate::data::origin::{Kind, provenance};
 use crate::data::{ContentHash, Provenance, weights};
@@ -12,6 +11,9 @@ use crate::tasks::with_layout;
 use crate::tensor::NamedTensor;
 use serde_json::Value;
 use std::path::Path;
+
+/// The key of a provenance's settings that says that what was learned from is a dataset of another program, and which columns.
+pub const FOREIGN: &str = "columns";
 
 /// Refuses an input that was made for another task, or for one of the same name that says something else.
 ///

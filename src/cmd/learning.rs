@@ -1,8 +1,8 @@
 //! What `hilt pretrain` and `hilt train` learn from: demos of a task of hilt, or a dataset that another program wrote.
 
 use super::Console;
-use super::common::{FOREIGN, Flag, RUNS, SettingsArgs, path_or};
-use super::fits::{read_network, same_layout, same_task};
+use super::common::{Flag, RUNS, SettingsArgs, path_or};
+use super::fits::{FOREIGN, read_network, same_layout, same_task};
 use crate::config::{LearningSettings, Pipeline, PretrainSettings, Stage, TrainSettings};
 use crate::data::dataset::foreign::{self, Choice, Source};
 use crate::data::origin::Kind;

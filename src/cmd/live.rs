@@ -31,6 +31,8 @@ impl LiveArgs {
 
 /// The files that are open.
 pub struct Live<'a> {
+    /// The stage that writes them.
+    stage: &'static str,
     console: &'a Console,
     lines: Option<(PathBuf, File)>,
     events: Option<(PathBuf, File)>,
@@ -42,11 +44,17 @@ impl<'a> Live<'a> {
     ///
     /// # Errors
     /// [`Error::Io`] when a file cannot be created or written; [`Error::Failed`] for a checkpoint whose epochs cannot be read.
-    pub fn begin(args: &LiveArgs, resume: Option<&Checkpoint>, metrics: &[Metric], console: &'a Console) -> Result<Self> {
+    pub fn begin(
+        stage: &'static str,
+        args: &LiveArgs,
+        resume: Option<&Checkpoint>,
+        metrics: &[Metric],
+        console: &'a Console,
+    ) -> Result<Self> {
         let events = args.tensorboard.as_deref().map(|dir| dir.join(tensorboard::FILE));
         let lines = args.live.clone().map(open).transpose()?;
         let events = events.map(open).transpose()?;
-        let mut live = Live { console, lines, events, steps: tensorboard::Steps::default() };
+        let mut live = Live { stage, console, lines, events, steps: tensorboard::Steps::default() };
         if let Some((path, file)) = &mut live.events {
             file.write_all(&tensorboard::head()).map_err(|e| Error::io(path, "write", e))?;
         }
@@ -61,20 +69,20 @@ impl<'a> Live<'a> {
         let values = metrics.iter().map(|metric| (metric.name, epoch.get(metric.name)));
         if self.lines.is_some() {
             let line = live_file::line(&epoch.stage, [epoch.epoch, epoch.epochs], epoch.updates, values);
-            append(&mut self.lines, line.as_bytes(), self.console);
+            append(&mut self.lines, line.as_bytes(), (self.stage, self.console));
         }
         if self.events.is_some() {
             let scalars: Vec<tensorboard::Scalar> =
                 metrics.iter().map(|metric| (metric.name, metric.doc, epoch.get(metric.name))).collect();
-            append(&mut self.events, &self.steps.next(&scalars), self.console);
+            append(&mut self.events, &self.steps.next(&scalars), (self.stage, self.console));
         }
     }
 }
 
-fn append(open: &mut Option<(PathBuf, File)>, bytes: &[u8], console: &Console) {
+fn append(open: &mut Option<(PathBuf, File)>, bytes: &[u8], (stage, console): (&str, &Console)) {
     let Some((path, file)) = open else { return };
     if let Err(why) = file.write_all(bytes) {
-        console.say(&format!("train: {}: cannot write: {why}; training goes on without it", path.display()));
+        console.say(&format!("{stage}: {}: cannot write: {why}; training goes on without it", path.display()));
         *open = None;
     }
 }

@@ -21,7 +21,12 @@ pub fn size() -> Option<[usize; 2]> {
 
 /// Whether the terminal that stdout is can be written to anywhere, and shows colours at all.
 pub fn moves() -> bool {
-    stdout().is_terminal() && env::var_os("TERM").is_none_or(|name| name != "dumb" && !name.is_empty())
+    stdout().is_terminal() && can_move()
+}
+
+/// Whether the terminal, if there is one, can move its cursor: one without a name is taken for a simple one.
+pub fn can_move() -> bool {
+    env::var_os("TERM").is_some_and(|name| name != "dumb" && !name.is_empty())
 }
 
 /// Whether to write in colours: not where NO_COLOR says so (no-color.org), nor into a file.
@@ -33,7 +38,8 @@ pub fn colour() -> bool {
 pub fn unicode() -> bool {
     let said = ["LC_ALL", "LC_CTYPE", "LANG"].into_iter().find_map(|name| env::var(name).ok().filter(|said| !said.is_empty()));
     let utf8 = said.is_some_and(|said| said.to_lowercase().replace('-', "").ends_with("utf8"));
-    utf8 && env::var_os("TERM").is_none_or(|name| name != "dumb")
+    // A pipe has no terminal's name, and may be read as anything.
+    utf8 && (can_move() || env::var_os("TERM").is_none())
 }
 
 /// What stdout is called in errors.

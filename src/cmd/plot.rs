@@ -2,7 +2,10 @@ use super::places::{Content, Places};
 use super::{Context, Outcome, output};
 use crate::data::atomic;
 use crate::error::{Error, Result};
-use crate::report::curves::{Plot, Style, columns, draw, latest, live_of, picture, plots, sources};
+use crate::report::curves::{
+    Plot, Style, columns, draw, draw_errors, errors_picture, holds_model_errors, is_pretraining, latest, live_of, model_errors,
+    picture, plots, sources,
+};
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::thread::sleep;
@@ -12,11 +15,12 @@ use std::time::{Duration, SystemTime};
 /// over each other.
 ///
 /// Each stage of training is as wide as the next. --watch draws again whenever a training has written more (hilt train --live, make all LIVE=1) and ends
-/// with it.
+/// with it. A picture of a run is one of its trainings; of its dynamics network's errors that of dynamics.errors.parquet.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Example:\n  hilt plot policy.training.parquet --metric d_conv --metric alpha")]
 pub struct Args {
-    /// Runs, tables of metrics (policy.training.parquet, dynamics.pretraining.parquet), or what hilt train --live writes
+    /// Runs, tables of metrics (policy.training.parquet, dynamics.pretraining.parquet), errors of a dynamics network (dynamics.errors.parquet), or what
+    /// hilt train --live writes
     #[arg(value_name = "RUN|FILE", required = true)]
     of: Vec<PathBuf>,
     /// Draw this metric, a column of the table; may be repeated [default: those that say most]
@@ -52,13 +56,27 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome> {
     if args.watch {
         return watch(args, context);
     }
-    let found = drawn(&args.of, args, context)?;
+    let (errors, trainings): (Vec<PathBuf>, Vec<PathBuf>) = args.of.iter().cloned().partition(|path| holds_model_errors(path));
+    if !errors.is_empty() && !args.metric.is_empty() {
+        let message = format!("--metric chooses curves of trainings, and {} has none; leave one out", errors[0].display());
+        return Err(Error::Usage(message));
+    }
+    let found = if trainings.is_empty() { Vec::new() } else { drawn(&trainings, args, context)? };
     let Some(out) = &args.out else {
-        output::print(&draw(&found, &style(None)))?;
+        let asked = if args.metric.is_empty() { args.of.as_slice() } else { &[] };
+        let (style, errors) = (style(None), model_errors(asked, &context.interrupt)?);
+        output::print(&(draw(&found, &style) + &draw_errors(&errors, &style)))?;
         return Ok(Outcome::Done);
     };
-    let names: Vec<String> = args.of.iter().map(|path| path.display().to_string()).collect();
-    atomic::write_bytes(out, picture("training", &format!("Training: {}", names.join(", ")), &found).to_svg().as_bytes())?;
+    let made = match errors.as_slice() {
+        [] => {
+            let names: Vec<String> = args.of.iter().map(|path| path.display().to_string()).collect();
+            picture("training", &format!("Training: {}", names.join(", ")), &found)
+        }
+        errors if trainings.is_empty() => errors_picture(&model_errors(errors, &context.interrupt)?),
+        _ => return Err(Error::Usage("--out draws curves of trainings, or errors of dynamics networks: name one kind".into())),
+    };
+    atomic::write_bytes(out, made.to_svg().as_bytes())?;
     context.console.say(&format!("plot: wrote {}", out.display()));
     Ok(Outcome::Done)
 }
@@ -85,10 +103,12 @@ fn watch(args: &Args, context: &Context) -> Result<Outcome> {
         return Err(Error::Usage("--watch follows one training: name one run, or one file of hilt train --live".into()));
     };
     let (mut seen, mut waits) = (None, false);
+    // In a run training follows, after a pretraining that is over.
+    let mut ended: Option<PathBuf> = None;
     while !context.interrupt.is_raised() {
         let live = if of.is_dir() { live_of(of)?.into_iter().next() } else { Some(of.clone()) };
-        match live.filter(|file| file.is_file()) {
-            None if !waits => {
+        match live.filter(|file| file.is_file() && ended.as_ref() != Some(file)) {
+            None if !waits && ended.is_none() => {
                 let of = of.display();
                 context.console.say(&format!("plot: waits for a training in {of} that writes its metrics: hilt train --live {of}/policy.training.jsonl, or make all LIVE=1"));
                 waits = true;
@@ -101,7 +121,10 @@ fn watch(args: &Args, context: &Context) -> Result<Outcome> {
                     show(&file, args, context, seen.is_none())?;
                     seen = now;
                 }
-                if over {
+                if over && of.is_dir() && is_pretraining(&file) {
+                    context.console.say("plot: pretraining has ended; waits for the training");
+                    (ended, seen) = (Some(file), None);
+                } else if over {
                     context.console.say("plot: training has ended");
                     return Ok(Outcome::Done);
                 }

@@ -1,6 +1,7 @@
 use super::common::SettingsArgs;
 use super::epochs::Epochs;
 use super::learning::{ColumnArgs, Demos, Learning};
+use super::live::{Live, LiveArgs};
 use super::places::{Content, beside};
 use super::{Context, Outcome, dropped, output};
 use crate::config::{Pipeline, SimulateSettings, Stage};
@@ -30,6 +31,8 @@ pub struct Args {
     /// Weights to write, with <name>.errors.parquet and <name>.pretraining.parquet, their errors and the epochs, beside them [default: runs/<TASK>/dynamics.safetensors]
     #[arg(long, value_name = "FILE.safetensors")]
     out: Option<PathBuf>,
+    #[command(flatten)]
+    live: LiveArgs,
 }
 
 pub fn run(args: &Args, context: &Context) -> Result<Outcome> {
@@ -39,7 +42,8 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome> {
     let places =
         args.settings.places(&context.console).read(&learning.dataset).write("--out", &out, Content::Weights(KIND, "pretrain"));
     let places = places.write("the table of errors", &errors, Content::Table("pretrain"));
-    places.write("the table of epochs", &metrics, Content::Table("pretrain")).check(&context.console)?;
+    let places = places.write("the table of epochs", &metrics, Content::Table("pretrain"));
+    args.live.places(places).check(&context.console)?;
     let Demos { mut train, validation, content } = learning.demos(&args.settings, &context.console)?;
     let provenance = learning.provenance(&args.settings, Stage::Pretrain, &[("dataset", content)])?;
 
@@ -51,7 +55,12 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome> {
         train.extend(again);
     }
     let mut epochs = Epochs::new(&context.console);
-    let (mut log, settings) = (|epoch: &_, metrics| epochs.step(epoch, metrics), learning.pretrain());
+    let mut live = Live::begin("pretrain", &args.live, None, &[], &context.console)?;
+    let mut log = |epoch: &_, metrics: &_| {
+        epochs.step(epoch, metrics);
+        live.step(epoch, metrics);
+    };
+    let settings = learning.pretrain();
     let (dynamics, report) = pretrain_dynamics(train, validation, settings, seed, &mut log, &context.interrupt)?;
     epochs.finish();
     context.console.say(output::table_text(&report.errors).trim_end());

@@ -14,7 +14,7 @@ pub struct Args {
     /// Only the sections that this stage reads: plan, simulate, convert, pretrain, train or evaluate
     #[arg(long, value_name = "STAGE")]
     stage: Option<Stage>,
-    /// Explain a key, a section or all of them instead: meaning, unit, what is allowed, the default, and what each preset says
+    /// Explain a key, a section or all of them instead: meaning, unit, what is allowed, the default, what each preset says, and what was measured
     #[arg(long, value_name = "KEY", num_args = 0..=1, default_missing_value = "", conflicts_with = "stage")]
     explain: Option<String>,
 }

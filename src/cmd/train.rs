@@ -112,7 +112,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome> {
         Some(inputs) => imitator(args.method, inputs, dynamics, settings, seed)?,
     };
     let mut epochs = Epochs::new(console);
-    let mut live = Live::begin(&args.live, resume.as_ref(), learner.metrics(), console)?;
+    let mut live = Live::begin("train", &args.live, resume.as_ref(), learner.metrics(), console)?;
     let hooks = Hooks {
         log: Box::new(|epoch, metrics| {
             epochs.step(epoch, metrics);

@@ -1,4 +1,4 @@
-//! What each key means: the words beside its field, what is allowed, and what the presets say.
+//! What each key means: the words beside its field, what is allowed, what the presets say, and what was measured.
 
 use super::check::{hint, leaves};
 use super::load::Source;
@@ -25,7 +25,12 @@ pub struct Explained {
     pub default: String,
     /// What each preset says.
     pub presets: Vec<OfPreset>,
+    /// What was measured of it, where something was.
+    pub measured: Option<String>,
 }
+
+/// What was measured, a text a key.
+const MEASURED: &str = include_str!("measured.toml");
 
 /// What a preset says of a key.
 #[derive(Clone, Debug, PartialEq)]
@@ -95,7 +100,14 @@ fn explained(
         allowed: Range::of(key).map(|range| range.to_string()),
         default: default.to_string(),
         presets: presets.iter().map(|(name, tables)| OfPreset { name, values: values(tables) }).collect(),
+        measured: measured().into_iter().find_map(|(of, text)| (of == key).then_some(text)),
     }
+}
+
+fn measured() -> Vec<(String, String)> {
+    let table: toml::Table = MEASURED.parse().expect("measured.toml is TOML");
+    let text = |value: toml::Value| value.as_str().expect("measured.toml holds texts").to_string();
+    leaves(&table).into_iter().map(|(key, value)| (key, text(value))).collect()
 }
 
 /// The words beside the field of `key`, and the names that its values may have, with their words.
@@ -138,7 +150,7 @@ impl fmt::Display for Explained {
                 values.iter().map(|(value, tasks)| if one { value.clone() } else { format!("{value} ({})", tasks.join(", ")) });
             writeln!(f, "  {name}: {}", said.collect::<Vec<_>>().join("; "))?;
         }
-        Ok(())
+        self.measured.as_ref().map_or(Ok(()), |measured| writeln!(f, "  measured: {measured}"))
     }
 }
 
@@ -158,6 +170,16 @@ mod tests {
         // Every number has a range, whatever its field is called.
         let numbers = all.iter().filter(|one| one.default.parse::<f64>().is_ok());
         assert_eq!(numbers.filter(|one| one.allowed.is_none()).map(|one| &one.key).collect::<Vec<_>>(), Vec::<&String>::new());
+    }
+
+    #[test]
+    fn what_was_measured_is_told_of_keys_that_there_are() {
+        let all = explain("", None).expect("explained");
+        let unknown: Vec<String> =
+            measured().into_iter().map(|(key, _)| key).filter(|key| all.iter().all(|one| one.key != *key)).collect();
+        assert_eq!(unknown, [] as [&str; 0]);
+        let [fingers] = &explain("train.sc.fingers", None).expect("explained")[..] else { panic!("one key") };
+        assert!(fingers.to_string().contains("\n  measured: 100 demos, raw state: \"following\" 284"), "{fingers}");
     }
 
     #[test]

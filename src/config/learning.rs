@@ -1,7 +1,7 @@
 //! The settings of learning alone, for a dataset that has neither a task of hilt nor a simulator behind it.
 
-use super::load::{extended, lay_over, put};
-use super::pipeline_file::{ROBOT, TASK, read_table};
+use super::load::{extended, put};
+use super::pipeline_file::{ROBOT, TASK, lay_over, read_table};
 use super::{ConvertSettings, FeatureSet, Pipeline, Preset, PretrainSettings, ProjectFile, Stage, TrainSettings, check};
 use crate::error::{Error, Result};
 use crate::task::built_in;

@@ -1,6 +1,6 @@
 //! From a preset or a pipeline file and `--set` words to a checked [`Pipeline`].
 
-use super::pipeline_file::{ROBOT, TASK, parsed, read_table};
+use super::pipeline_file::{ROBOT, TASK, lay_over, parsed, read_table};
 use super::ranges::Range;
 use super::robot::is_file;
 use super::{ChosenTask, Pipeline, Preset, ProjectFile, check};
@@ -77,18 +77,6 @@ pub(super) fn extended(mut own: toml::Table, origin: &str) -> Result<toml::Table
     table.remove(TASK);
     lay_over(&mut table, own);
     Ok(table)
-}
-
-/// Puts `own` over `table`, key by key.
-pub(super) fn lay_over(table: &mut toml::Table, own: toml::Table) {
-    for (key, value) in own {
-        match (table.get_mut(&key), value) {
-            (Some(toml::Value::Table(inner)), toml::Value::Table(value)) => lay_over(inner, value),
-            (_, value) => {
-                table.insert(key, value);
-            }
-        }
-    }
 }
 
 /// The name of the task that a table says.

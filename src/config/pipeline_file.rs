@@ -27,6 +27,18 @@ pub(super) fn read_table(path: &Path) -> Result<toml::Table> {
     Ok(own)
 }
 
+/// Puts `own` over `table`, key by key.
+pub(super) fn lay_over(table: &mut toml::Table, own: toml::Table) {
+    for (key, value) in own {
+        match (table.get_mut(&key), value) {
+            (Some(toml::Value::Table(inner)), toml::Value::Table(value)) => lay_over(inner, value),
+            (_, value) => {
+                table.insert(key, value);
+            }
+        }
+    }
+}
+
 /// The table in a text.
 pub(super) fn parsed(text: &str, origin: &str) -> Result<toml::Table> {
     text.parse().map_err(|e: toml::de::Error| {

@@ -1,6 +1,6 @@
 //! `hilt.toml`: what is said once for a directory and all below it, instead of with every command.
 
-use super::pipeline_file::{ROBOT, TASK, read_table};
+use super::pipeline_file::{ROBOT, TASK, lay_over, read_table};
 use super::{Pipeline, Preset, check};
 use crate::error::{Error, Result};
 use crate::task::built_in;
@@ -68,7 +68,7 @@ impl ProjectFile {
         let pipeline = pipeline.map(|file| path.parent().unwrap_or(Path::new("")).join(file));
         // What it says is wrong or right whatever the command; values that go together only with a pipeline's are checked again.
         let mut all = Pipeline::defaults(&built_in::pick_up()).to_table()?;
-        super::load::lay_over(&mut all, settings.clone());
+        lay_over(&mut all, settings.clone());
         check::resolve(all, &path.display().to_string())?;
         Ok(ProjectFile { path: path.into(), task, robot, preset, pipeline, settings })
     }

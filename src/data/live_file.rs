@@ -64,7 +64,10 @@ pub fn read(path: &Path) -> Result<Table> {
     for (at, line) in whole.split(|byte| *byte == b'\n').enumerate().filter(|(_, line)| !line.is_empty()) {
         let fields = parsed(line).ok_or_else(|| {
             let number = at + 1;
-            Error::input(path, format!("line {number} is no epoch of a training; expected what hilt train --live writes"))
+            Error::input(
+                path,
+                format!("line {number} is no epoch of a training; expected what --live of hilt train or pretrain writes"),
+            )
         })?;
         rows.push(fields);
     }

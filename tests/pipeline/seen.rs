@@ -172,6 +172,26 @@ fn metrics_as_they_come_are_those_of_the_table_also_after_a_training_that_went_o
 }
 
 #[test]
+fn a_pretraining_is_watched_like_a_training() {
+    let run = Run::finished();
+    let (live, board) = (run.name("dynamics.pretraining.jsonl"), run.name("board"));
+    let words = run.words("pretrain").into_iter().chain(words(&["--live", &live, "--tensorboard", &board])).collect::<Vec<_>>();
+    let output = hilt(words);
+    assert!(output.status.success(), "{}", text(&output.stderr));
+    let (table, _) = table_file::read(&run.at("dynamics.pretraining.parquet")).expect("a table");
+    let Values::F64(l_model) = &table.column("l_model").expect("a column").values else { panic!("numbers") };
+    let lines = fs::read_to_string(&live).expect("readable");
+    let found: Vec<Option<f64>> =
+        lines.lines().map(|line| serde_json::from_str::<Value>(line).expect("JSON")["l_model"].as_f64()).collect();
+    assert_eq!(found, l_model.iter().map(|loss| Some(*loss)).collect::<Vec<_>>());
+    assert!(said(&["plot", &live]).contains("l_model"));
+    let out = run.name("exported");
+    said(&["export", "tensorboard", &run.name("dynamics.pretraining.parquet"), "--out", &out]);
+    let events = |dir: &str| fs::read(Path::new(dir).join("events.out.tfevents.0.hilt")).expect("events");
+    assert!(events(&board) == events(&format!("{out}/dynamics")));
+}
+
+#[test]
 fn what_is_exported_as_csv_is_what_the_files_hold() {
     let run = Run::finished();
     let of = |name: &str| said(&["export", "csv", &run.name(name)]);
@@ -227,6 +247,16 @@ fn a_plot_is_plain_where_nothing_else_is_known_of_the_reader_and_a_picture_parse
     let svg = fs::read_to_string(&out).expect("written");
     let document = roxmltree::Document::parse(&svg).expect("XML");
     assert_eq!(document.descendants().filter(|n| n.attribute("class") == Some("curve")).count(), 1);
+
+    // The errors of the dynamics network stand below the curves, and are a picture of their own.
+    assert!(drawn.contains("model error after 10 steps, as a share") && drawn.contains("arm_q"), "{drawn}");
+    let errors = run.name("dynamics.errors.parquet");
+    let (table, _) = table_file::read(Path::new(&errors)).expect("a table");
+    said(&["plot", &errors, "--out", &out]);
+    let svg = fs::read_to_string(&out).expect("written");
+    let document = roxmltree::Document::parse(&svg).expect("XML");
+    let marks = document.descendants().filter(|n| n.attribute("class").is_some_and(|class| class.contains("mean"))).count();
+    assert!(marks > table.rows() && marks <= 2 * table.rows(), "{marks} marks for {} groups", table.rows());
 }
 
 #[test]
@@ -256,6 +286,10 @@ fn what_cannot_be_looked_at_is_refused_with_what_to_do() {
     refuses(&["plot", &at, "--out", &name("curves.png")], &["must end in .svg"]);
     refuses(&["plot", &at, "--out", &name("notes.svg")], &["is there already"]);
     refuses(&["plot", &name("notes.jsonl")], &["line 1 is no epoch of a training"]);
+    refuses(&["plot", &name("dynamics.errors.parquet"), "--metric", "l_bc"], &["--metric chooses curves of trainings"]);
+    refuses(&["plot", &at, &name("dynamics.errors.parquet"), "--out", &name("both.svg")], &["name one kind"]);
+    fs::copy(name("evaluation.parquet"), name("other.errors.parquet")).expect("copied");
+    refuses(&["plot", &name("other.errors.parquet")], &["holds no errors of a dynamics network"]);
     refuses(&["plot", "--watch", &at, &at], &["--watch follows one training"]);
     refuses(&["export", "csv", &name("policy.safetensors")], &["is neither a table (Parquet), a recording (MCAP) nor a dataset"]);
     refuses(&["export", "csv", &name("dataset")], &["holds two datasets", "dataset/train"]);

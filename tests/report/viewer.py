@@ -106,6 +106,49 @@ def check(page, truth, name):
         wrong.append(f"{name}: the scene has {colours} colours")
 
 
+def touch(page, name):
+    """One finger turns the eye, two that part bring it nearer by as much as they part, and the slider follows a finger."""
+    client = page.context.new_cdp_session(page)
+
+    def fingers(kind, *places):
+        points = [{"x": x, "y": y, "id": i} for i, (x, y) in enumerate(places)]
+        client.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": points})
+
+    def eye():
+        return page.evaluate("[hilt.camera.turn, hilt.camera.rise, hilt.camera.distance]")
+
+    page.evaluate("document.getElementById('view').scrollIntoView(), hilt.camera.reset(), hilt.frame()")
+    box = page.locator("#view").bounding_box()
+    x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
+    before = eye()
+    fingers("touchStart", (x, y))
+    for moved in (10, 20, 30, 40):
+        fingers("touchMove", (x + moved, y))
+    fingers("touchEnd")
+    after = eye()
+    if not (abs(after[0] - before[0]) > 0.1 and after[1:] == before[1:]):
+        wrong.append(f"{name}: a finger that goes 40 pixels to the right turns {before} to {after}")
+    fingers("touchStart", (x - 30, y))
+    fingers("touchStart", (x - 30, y), (x + 30, y))
+    for apart in (40, 50, 60):
+        fingers("touchMove", (x - apart, y), (x + apart, y))
+    fingers("touchEnd")
+    nearer = eye()
+    if not (nearer[0] == after[0] and abs(nearer[2] / after[2] - 0.5) < 0.02):
+        wrong.append(f"{name}: fingers that part to twice their distance bring the eye from {after[2]} to {nearer[2]} m")
+    page.evaluate("document.getElementById('slider').scrollIntoView()")
+    box = page.locator("#slider").bounding_box()
+    y = box["y"] + box["height"] / 2
+    fingers("touchStart", (box["x"] + 0.3 * box["width"], y))
+    fingers("touchMove", (box["x"] + 0.5 * box["width"], y))
+    fingers("touchMove", (box["x"] + 6 + 0.7 * (box["width"] - 12), y))
+    fingers("touchEnd")
+    share = page.evaluate("hilt.state.time / hilt.state.duration")
+    if abs(share - 0.7) > 0.02:
+        wrong.append(f"{name}: a finger at .70 of the slider shows {share:.2f} of the time")
+    page.evaluate("hilt.camera.reset(), window.scrollTo(0, 0)")
+
+
 with sync_playwright() as playwright:
     browser = playwright.chromium.launch(
         executable_path=os.environ.get("CHROMIUM") or None,
@@ -128,6 +171,8 @@ with sync_playwright() as playwright:
             first = page.evaluate("hilt.firstFrame_ms")
             if truth:
                 check(page, truth, name)
+            if size == "phone":
+                touch(page, name)
             if page.evaluate("document.documentElement.scrollWidth") > width:
                 wrong.append(f"{name}: the page is wider than the window")
             page.evaluate("hilt.seek(hilt.state.duration * 0.62), hilt.frame()")

@@ -10,8 +10,10 @@ use std::path::{Path, PathBuf};
 
 /// Endings of the tables of metrics that stages write.
 const TABLES: [&str; 2] = [".training.parquet", ".pretraining.parquet"];
-/// Ending of the metrics of a training as they come, beside the policy.
-const LIVE: &str = ".training.jsonl";
+/// Endings of the same metrics as they come.
+const LIVE: [&str; 2] = [".training.jsonl", ".pretraining.jsonl"];
+/// Of which the second is of the dynamics network.
+const PRETRAINING: usize = 1;
 /// Columns that say where training stood.
 pub(super) const PLACE: [&str; 3] = ["stage", "epoch", "updates"];
 
@@ -45,9 +47,8 @@ pub fn sources(named: &[PathBuf], interrupt: &Interrupt) -> Result<Vec<Source>> 
 /// The files of metrics in a run: of a training that goes on, or was stopped, those that it has written so far.
 fn of_run(dir: &Path) -> Result<Vec<PathBuf>> {
     let files = files_in(dir)?;
-    let ending = |file: &PathBuf, ending: &str| file.to_str().is_some_and(|name| name.ends_with(ending));
-    let mut found: Vec<PathBuf> = files.iter().filter(|file| TABLES.iter().any(|table| ending(file, table))).cloned().collect();
-    for live in files.iter().filter(|file| ending(file, LIVE)) {
+    let mut found: Vec<PathBuf> = files.iter().filter(|file| ends_in(file, &TABLES)).cloned().collect();
+    for live in files.iter().filter(|file| ends_in(file, &LIVE)) {
         let table = live.with_extension("parquet");
         let newer = |one: &Path, other: &Path| {
             let time = |path: &Path| fs::metadata(path).and_then(|found| found.modified()).ok();
@@ -69,9 +70,18 @@ fn of_run(dir: &Path) -> Result<Vec<PathBuf>> {
     Ok(found)
 }
 
+fn ends_in(file: &Path, endings: &[&str]) -> bool {
+    file.to_str().is_some_and(|name| endings.iter().any(|ending| name.ends_with(ending)))
+}
+
 fn files_in(dir: &Path) -> Result<Vec<PathBuf>> {
     let entries = fs::read_dir(dir).map_err(|e| Error::io(dir, "read", e))?;
     Ok(entries.filter_map(|entry| entry.ok()).map(|entry| entry.path()).filter(|path| path.is_file()).collect())
+}
+
+/// Whether metrics as they come are those of a dynamics network.
+pub fn is_pretraining(live: &Path) -> bool {
+    ends_in(live, &LIVE[PRETRAINING..])
 }
 
 /// The metrics of trainings in `dir` as they come, the newest first.
@@ -79,8 +89,7 @@ fn files_in(dir: &Path) -> Result<Vec<PathBuf>> {
 /// # Errors
 /// [`Error::Io`] when the directory cannot be read.
 pub fn live_of(dir: &Path) -> Result<Vec<PathBuf>> {
-    let mut found: Vec<PathBuf> =
-        files_in(dir)?.into_iter().filter(|file| file.to_str().is_some_and(|name| name.ends_with(LIVE))).collect();
+    let mut found: Vec<PathBuf> = files_in(dir)?.into_iter().filter(|file| ends_in(file, &LIVE)).collect();
     found.sort_by_key(|file| std::cmp::Reverse(fs::metadata(file).and_then(|found| found.modified()).ok()));
     Ok(found)
 }
@@ -95,7 +104,7 @@ fn read(path: &Path) -> Result<Source> {
             (metrics, made.settings["method"].as_str().map(String::from))
         }
         _ => {
-            let message = "holds no metrics of a training; expected policy.training.parquet, dynamics.pretraining.parquet, what hilt train --live writes, or a run";
+            let message = "holds no metrics of a training; expected policy.training.parquet, dynamics.pretraining.parquet, what --live of hilt train or pretrain writes, dynamics.errors.parquet, or a run";
             return Err(Error::input(path, message));
         }
     };

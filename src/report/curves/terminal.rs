@@ -92,7 +92,8 @@ fn legend(plots: &[Plot], marked: bool, style: &Style) -> String {
     if text.is_empty() { text } else { text + "\n" }
 }
 
-fn painted(text: &str, source: usize, style: &Style) -> String {
+/// Text in the colour of a curve.
+pub(super) fn painted(text: &str, source: usize, style: &Style) -> String {
     if !style.colour {
         return text.into();
     }

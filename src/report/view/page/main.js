@@ -229,7 +229,7 @@ requestAnimationFrame(now => {
 
 /** For tests and the curious: what the page shows. Poses are those of the last picture: of links and objects, 16 numbers each, column by column. */
 window.hilt = {
-  state, play, seek, show, frame,
+  state, play, seek, show, frame, camera,
   firstFrame_ms: performance.now(),
   poses: n => stage && { links: stage.drawn.get(n).links.map(m => [...m]), objects: stage.drawn.get(n).objects.map(m => [...m]) },
   /** Mean time of a picture of the scene alone, waited for \[ms\]. */
