@@ -288,7 +288,7 @@ fn what_cannot_be_looked_at_is_refused_with_what_to_do() {
     refuses(&["plot", &name("notes.jsonl")], &["line 1 is no epoch of a training"]);
     refuses(&["plot", &name("dynamics.errors.parquet"), "--metric", "l_bc"], &["--metric chooses curves of trainings"]);
     refuses(&["plot", &at, &name("dynamics.errors.parquet"), "--out", &name("both.svg")], &["name one kind"]);
-    fs::copy(name("evaluation.parquet"), name("other.errors.parquet")).expect("copied");
+    fs::copy(name("evaluation.episodes.parquet"), name("other.errors.parquet")).expect("copied");
     refuses(&["plot", &name("other.errors.parquet")], &["holds no errors of a dynamics network"]);
     refuses(&["plot", "--watch", &at, &at], &["--watch follows one training"]);
     refuses(&["export", "csv", &name("policy.safetensors")], &["is neither a table (Parquet), a recording (MCAP) nor a dataset"]);
