@@ -41,8 +41,13 @@ pub fn main() -> Result<(), Box<dyn std::error::Error>> {
     };
     let demos = (0..20).map(demo).collect::<Result<Vec<_>, _>>()?;
     let inputs = Inputs::new(&demos[..18], &demos[18..])?;
-    let settings =
-        TrainSettings { features: FeatureSet::Raw, warm_start_updates: 1500, epochs: 0, hidden_units: 32, ..Default::default() };
+    let settings = TrainSettings {
+        features: FeatureSet::Raw,
+        warm_start_updates: 1500.into(),
+        epochs: 0,
+        hidden_units: 32,
+        ..Default::default()
+    };
     let trained = train(MethodName::Bc, inputs, None, &settings, 0, Hooks::new(&Interrupt::default()))?;
     for at in [[0.5, -0.5], [-0.3, 0.2]] {
         let (velocity, wanted) = (trained.policy.act(&at), at.map(|x| -BACK_PER_S * x));

@@ -80,7 +80,7 @@ pub fn settings() -> TrainSettings {
     TrainSettings {
         hidden_units: 4,
         hidden_layers: 1,
-        warm_start_updates: 2,
+        warm_start_updates: 2.into(),
         bc_batch: 8,
         epochs: 2,
         min_updates: 0,

@@ -150,6 +150,63 @@ impl<'de> Deserialize<'de> for Alpha {
     }
 }
 
+/// A number of updates, or as many as the demos ask for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Updates {
+    /// By the number of transitions.
+    Auto,
+    /// So many.
+    Exactly(u64),
+}
+
+/// The word for [`Updates::Auto`].
+const AUTO: &str = "auto";
+
+impl From<u64> for Updates {
+    fn from(updates: u64) -> Self {
+        Updates::Exactly(updates)
+    }
+}
+
+impl Serialize for Updates {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        match self {
+            Updates::Auto => serializer.serialize_str(AUTO),
+            Updates::Exactly(updates) => serializer.serialize_u64(*updates),
+        }
+    }
+}
+
+impl<'de> Deserialize<'de> for Updates {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        deserializer.deserialize_any(UpdatesVisitor)
+    }
+}
+
+struct UpdatesVisitor;
+
+impl Visitor<'_> for UpdatesVisitor {
+    type Value = Updates;
+
+    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("\"auto\" or a whole number")
+    }
+
+    fn visit_str<E: de::Error>(self, value: &str) -> Result<Updates, E> {
+        let auto = (value == AUTO).then_some(Updates::Auto);
+        auto.ok_or_else(|| E::invalid_value(de::Unexpected::Str(value), &self))
+    }
+
+    fn visit_i64<E: de::Error>(self, value: i64) -> Result<Updates, E> {
+        let updates = u64::try_from(value).map_err(|_| E::invalid_value(de::Unexpected::Signed(value), &self));
+        updates.map(Updates::Exactly)
+    }
+
+    fn visit_u64<E: de::Error>(self, value: u64) -> Result<Updates, E> {
+        Ok(Updates::Exactly(value))
+    }
+}
+
 struct AlphaVisitor;
 
 impl Visitor<'_> for AlphaVisitor {

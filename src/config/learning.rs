@@ -2,7 +2,8 @@
 
 use super::load::{extended, put};
 use super::pipeline_file::{ROBOT, TASK, lay_over, read_table};
-use super::{ConvertSettings, FeatureSet, Pipeline, Preset, PretrainSettings, ProjectFile, Stage, TrainSettings, check};
+use super::train::MOST_AUTO_UPDATES;
+use super::{ConvertSettings, FeatureSet, Pipeline, Preset, PretrainSettings, ProjectFile, Stage, TrainSettings, Updates, check};
 use crate::error::{Error, Result};
 use crate::task::built_in;
 use crate::words::shown;
@@ -86,8 +87,12 @@ impl LearningSettings {
             self.pretrain.batch_rows = self.pretrain.batch_rows.min(fitting);
         }
         if !warm_start {
-            let pass = transitions.div_ceil(self.train.bc_batch.max(1)) as u64;
-            self.train.warm_start_updates = self.train.warm_start_updates.min(WARM_START_PASSES * pass);
+            let most = match self.train.warm_start_updates {
+                Updates::Auto => MOST_AUTO_UPDATES,
+                Updates::Exactly(updates) => updates,
+            };
+            let passes = WARM_START_PASSES * self.train.updates_of_a_pass(transitions);
+            self.train.warm_start_updates = most.min(passes).into();
         }
         if !least {
             self.train.min_updates = 0;
@@ -153,11 +158,12 @@ mod tests {
     fn few_demos_are_passed_over_as_often_as_many_unless_it_is_said() {
         let of = |transitions: usize, sets: &[&str]| {
             let settings = load(Preset::Best, sets).expect("settings").sized(transitions);
-            (settings.pretrain.batch_rows, settings.train.warm_start_updates, settings.train.min_updates)
+            (settings.pretrain.batch_rows, settings.train.warm_start(transitions), settings.train.min_updates)
         };
         assert_eq!(of(360, &[]), (32, 300, 0));
         assert_eq!(of(6200, &[]), (194, 3900, 0));
-        assert_eq!(of(1_000_000, &[]), (512, 15_000, 0));
+        assert_eq!(of(100_000, &[]), (512, 58_800, 0));
+        assert_eq!(of(1_000_000, &[]), (512, 100_000, 0));
         let said = ["pretrain.batch_rows=400", "train.warm_start_updates = 9000", "train.min_updates=2000"];
         assert_eq!(of(360, &said), (400, 9000, 2000));
     }

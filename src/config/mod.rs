@@ -23,7 +23,7 @@ mod train;
 
 pub use bc_rl::BcRlSettings;
 pub use choices::{
-    ActionChoice, Alpha, Convergence, FeatureSet, FingerCloning, ModelLoss, Objective, Pairs, StateScale, Structure,
+    ActionChoice, Alpha, Convergence, FeatureSet, FingerCloning, ModelLoss, Objective, Pairs, StateScale, Structure, Updates,
 };
 pub use data::{ConvertSettings, EvaluateSettings};
 pub use explain::{Explained, OfPreset, explain};

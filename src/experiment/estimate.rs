@@ -30,6 +30,8 @@ const HIL_BATCH: f64 = 8.0;
 const PPO_STEP_S: f64 = 20.8 / 102_400.0;
 /// Of one episode of an evaluation: 11.3 s for 500 \[s\].
 const EVALUATE_S: f64 = 11.3 / 500.0;
+/// Control steps of one of those demonstrations.
+const DEMO_STEPS: f64 = 95.0;
 /// Lines of a log that a stage ends with.
 const WALL: &str = "wall time ";
 const PROCESSOR: &str = "processor time ";
@@ -62,12 +64,13 @@ fn by_rewards(method: Option<MethodName>) -> bool {
 
 /// Updates on demos, counted in those of behavior cloning.
 fn updates(pipeline: &Pipeline, demos: f64, method: Option<MethodName>) -> f64 {
-    let train = method.map_or_else(|| pipeline.train.clone(), |method| method.own_settings(&pipeline.train));
+    let transitions = (demos * DEMO_STEPS) as usize;
+    let train = method.map_or_else(|| pipeline.train.clone(), |method| method.own_settings(&pipeline.train, transitions));
     let per_epoch = (demos / train.batch.max(1) as f64).ceil().max(1.0);
     let of_algorithm_1 = train.epochs_of(per_epoch as u64) as f64 * per_epoch;
     let each =
         if matches!(method, Some(MethodName::Bc | MethodName::BcRl)) { 1.0 } else { HIL_UPDATE * train.batch as f64 / HIL_BATCH };
-    train.warm_start_updates as f64 + each * of_algorithm_1
+    train.warm_start(transitions) as f64 + each * of_algorithm_1
 }
 
 /// The wall time that a log ends with \[s\].

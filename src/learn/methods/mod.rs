@@ -52,16 +52,17 @@ impl MethodName {
     }
 
     /// The settings that it trains with. State cloning has features of its own, and no warm start, which is behavior cloning; it may use as
-    /// many updates as that, and its learning rate.
-    pub fn own_settings(self, settings: &TrainSettings) -> TrainSettings {
+    /// many updates as that on so many `transitions`, and its learning rate.
+    pub fn own_settings(self, settings: &TrainSettings, transitions: usize) -> TrainSettings {
         let mut own = settings.clone();
+        let warm_start = settings.warm_start(transitions);
         if self != MethodName::Sc {
             return own;
         }
         own.features = settings.sc.features;
-        if settings.warm_start_updates > 0 {
-            own.warm_start_updates = 0;
-            own.min_updates = settings.min_updates.max(settings.warm_start_updates);
+        if warm_start > 0 {
+            own.warm_start_updates = 0.into();
+            own.min_updates = settings.min_updates.max(warm_start);
             own.learning_rate = settings.warm_start_learning_rate;
         }
         own
@@ -119,7 +120,8 @@ pub fn imitator(
     let Some(alpha) = method.alpha(settings) else {
         return Err(Error::Usage(format!("{} learns in the simulator, not from demos alone", method.name())));
     };
-    Ok(Box::new(Hil::new(inputs, dynamics, alpha, &method.own_settings(settings), seed)?))
+    let own = method.own_settings(settings, inputs.train.rows());
+    Ok(Box::new(Hil::new(inputs, dynamics, alpha, &own, seed)?))
 }
 
 /// Trains a policy on demos. A run that goes on from a checkpoint of the same run ends with the same bits.
@@ -147,11 +149,11 @@ mod tests {
     fn state_cloning_alone_sees_what_its_own_key_says_and_learns_as_long_as_a_warm_start() {
         let sc = ScSettings { features: FeatureSet::FkNear, ..Default::default() };
         let settings = TrainSettings { features: FeatureSet::Fk, sc, min_updates: 10, ..Default::default() };
-        let own = MethodName::Sc.own_settings(&settings);
-        assert_eq!((own.features, own.warm_start_updates), (FeatureSet::FkNear, 0));
-        assert_eq!((own.min_updates, own.learning_rate), (settings.warm_start_updates, settings.warm_start_learning_rate));
+        let own = MethodName::Sc.own_settings(&settings, 50_000);
+        assert_eq!((own.features, own.warm_start_updates), (FeatureSet::FkNear, 0.into()));
+        assert_eq!((own.min_updates, own.learning_rate), (24_500, settings.warm_start_learning_rate));
         for method in [MethodName::Hil, MethodName::Bc, MethodName::Ppo, MethodName::BcRl] {
-            assert_eq!(method.own_settings(&settings), settings);
+            assert_eq!(method.own_settings(&settings, 50_000), settings);
         }
     }
 }

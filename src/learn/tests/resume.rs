@@ -19,7 +19,7 @@ fn quick() -> TrainSettings {
     TrainSettings {
         hidden_units: 16,
         hidden_layers: 2,
-        warm_start_updates: 10,
+        warm_start_updates: 10.into(),
         bc_batch: 64,
         epochs: 3,
         min_updates: 0,
@@ -66,7 +66,7 @@ fn from_every_epoch_on_training_ends_with_the_same_bits() {
         (Method::Hil, TrainSettings { select_episodes: 5, sc: ScSettings { balance: true, ..Default::default() }, ..quick() }),
         (Method::Bc, TrainSettings { select_episodes: 5, ..quick() }),
         (Method::Sc, TrainSettings { clip_norm: 0.0, ..quick() }),
-        (Method::Hil, TrainSettings { warm_start_updates: 0, alpha: Alpha::Fixed(0.5), ..quick() }),
+        (Method::Hil, TrainSettings { warm_start_updates: 0.into(), alpha: Alpha::Fixed(0.5), ..quick() }),
     ] {
         let mut checkpoints = Vec::new();
         let keep = Box::new(|checkpoint: &Checkpoint| checkpoints.push(reread(checkpoint)));

@@ -19,7 +19,7 @@ fn quick() -> TrainSettings {
     TrainSettings {
         hidden_units: 24,
         hidden_layers: 2,
-        warm_start_updates: 30,
+        warm_start_updates: 30.into(),
         bc_batch: 64,
         epochs: 4,
         min_updates: 0,
@@ -40,7 +40,11 @@ fn bytes(policy: &Policy) -> Vec<u32> {
 #[test]
 fn pure_cloning_is_the_loop_with_alpha_at_its_ends() {
     let dynamics = pretrain(Toy::Stack, 2).0;
-    let fixed = |alpha: f64, warm_start_updates| TrainSettings { alpha: Alpha::Fixed(alpha), warm_start_updates, ..quick() };
+    let fixed = |alpha: f64, warm_start: u64| TrainSettings {
+        alpha: Alpha::Fixed(alpha),
+        warm_start_updates: warm_start.into(),
+        ..quick()
+    };
     let policy = |method, settings: &TrainSettings| bytes(&run(method, settings, Some(dynamics.clone())).expect("trains").policy);
     let bc = policy(Method::Bc, &quick());
     assert_eq!(policy(Method::Hil, &fixed(0.0, 30)), bc);
@@ -78,7 +82,7 @@ fn a_toy_is_learned_by_each_method() {
         assert!(network < 0.2 * unchanged, "group {group}: {network} against {unchanged}");
         assert!(number("integrated_10_steps", group) < 1e-4, "the toy integrates its commands");
     }
-    let settings = TrainSettings { warm_start_updates: 600, epochs: 60, learning_rate: 1e-3, ..quick() };
+    let settings = TrainSettings { warm_start_updates: 600.into(), epochs: 60, learning_rate: 1e-3, ..quick() };
     let unseen = demo(Toy::Stack, 30, 999);
     let (many, held_out) = (demos(Toy::Stack, 40, 30, 0), demos(Toy::Stack, 2, 30, 100));
     let error = |method: Method, settings: &TrainSettings| -> f64 {
@@ -93,7 +97,7 @@ fn a_toy_is_learned_by_each_method() {
         };
         (0..30).map(square).sum::<f64>() / (30 * JOINTS) as f64
     };
-    let untrained = error(Method::Bc, &TrainSettings { warm_start_updates: 1, epochs: 0, ..quick() });
+    let untrained = error(Method::Bc, &TrainSettings { warm_start_updates: 1.into(), epochs: 0, ..quick() });
     for (method, share) in [(Method::Bc, 0.3), (Method::Hil, 0.3), (Method::Sc, 0.4)] {
         let learned = error(method, &settings);
         assert!(learned < share * untrained, "{method:?}: {learned} against {untrained} untrained");

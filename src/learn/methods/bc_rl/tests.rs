@@ -12,7 +12,7 @@ fn settings() -> TrainSettings {
         hidden_layers: 2,
         hidden_units: 16,
         features: FeatureSet::Raw,
-        warm_start_updates: 20,
+        warm_start_updates: 20.into(),
         bc_batch: 64,
         epochs: 1,
         min_updates: 0,

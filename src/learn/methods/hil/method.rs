@@ -27,7 +27,7 @@ struct Counts {
 
 impl Method for Hil {
     fn stages(&self) -> Vec<Stage> {
-        let updates = self.settings.warm_start_updates;
+        let updates = self.settings.warm_start(self.inputs.train.rows());
         let of_warm_start = Batches::new(&self.inputs.train, self.settings.bc_batch).per_epoch();
         let epochs = self.settings.epochs_of(per_epoch(&self.inputs.train, &self.settings));
         vec![Stage { name: WARM_START, epochs: updates.div_ceil(of_warm_start) }, Stage { name: HIL, epochs }]

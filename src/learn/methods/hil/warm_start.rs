@@ -14,7 +14,7 @@ use crate::seed::stream;
 impl Hil {
     /// An epoch of the warm start: pairs shuffled across demos.
     pub(super) fn warm_start(&mut self, stage: Stage, epoch: u64, interrupt: &Interrupt) -> Result<EpochMetrics> {
-        let total = self.settings.warm_start_updates;
+        let total = self.settings.warm_start(self.inputs.train.rows());
         let (first, last) = (self.settings.warm_start_learning_rate, self.settings.final_learning_rate);
         let batches = Batches::new(&self.inputs.train, self.settings.bc_batch);
         let shuffled = batches.shuffled(&mut stream(self.seed, "train.warm-start", epoch));
