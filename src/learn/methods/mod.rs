@@ -151,7 +151,7 @@ mod tests {
         let settings = TrainSettings { features: FeatureSet::Fk, sc, min_updates: 10, ..Default::default() };
         let own = MethodName::Sc.own_settings(&settings, 50_000);
         assert_eq!((own.features, own.warm_start_updates), (FeatureSet::FkNear, 0.into()));
-        assert_eq!((own.min_updates, own.learning_rate), (24_500, settings.warm_start_learning_rate));
+        assert_eq!((own.min_updates, own.learning_rate), (37_240, settings.warm_start_learning_rate));
         for method in [MethodName::Hil, MethodName::Bc, MethodName::Ppo, MethodName::BcRl] {
             assert_eq!(method.own_settings(&settings, 50_000), settings);
         }
