@@ -1,7 +1,8 @@
 use super::common::SettingsArgs;
 use super::{Context, Outcome, output};
-use crate::config::{Stage, explain};
+use crate::config::{Explained, Stage, explain};
 use crate::error::Result;
+use crate::report::table::wrapped;
 
 /// Print the resolved settings of a task as TOML, itself a valid pipeline file.
 #[derive(Debug, clap::Args)]
@@ -23,7 +24,9 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome> {
     args.settings.places(&context.console).check(&context.console)?;
     if let Some(asked) = &args.explain {
         let explained = explain(asked, args.settings.task()?.as_ref())?;
-        return output::print(&explained.iter().map(ToString::to_string).collect::<Vec<_>>().join("\n")).map(|()| Outcome::Done);
+        let width = output::width();
+        let lines = |one: &Explained| one.to_string().lines().map(|line| wrapped(line, width)).collect::<String>();
+        return output::print(&explained.iter().map(lines).collect::<Vec<_>>().join("\n")).map(|()| Outcome::Done);
     }
     let pipeline = args.settings.resolve(&[])?;
     // What the files of a robot say belongs to the settings, as `make` compares them.
