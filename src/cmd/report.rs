@@ -89,15 +89,17 @@ fn named(args: &Args) -> Result<Vec<Finished>> {
 fn read(args: &Args, name: &str) -> Result<Finished> {
     let overrides = Overrides { seeds: None, episodes: args.episodes };
     let mut experiment = Experiment::read(&find(name)?, &overrides)?;
+    let dir = args.runs.join(&experiment.name);
+    let mut grid = Grid::expand(&experiment, &dir)?;
+    // Runs of seeds that are not shown belong to the experiment all the same.
+    leftovers::check(&dir, &grid)?;
     if let Some(chosen) = &args.seeds {
         experiment.seeds.retain(|seed| chosen.0.contains(seed));
         if experiment.seeds.is_empty() {
             return Err(Error::Usage(format!("--seeds: {} has none of them", experiment.name)));
         }
+        grid = Grid::expand(&experiment, &dir)?;
     }
-    let dir = args.runs.join(&experiment.name);
-    let grid = Grid::expand(&experiment, &dir)?;
-    leftovers::check(&dir, &grid)?;
     Finished::read(experiment, grid)
 }
 

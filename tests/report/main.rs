@@ -137,6 +137,9 @@ fn every_form_of_a_report_is_whole_and_the_same_each_time() {
     }
     let table = text(&place.hilt(&["inspect", "page/tables/tiny/pick-up.parquet"]).stdout);
     assert!(table.contains("rows: 6") && table.contains("success_rate"), "{table}");
+    // The runs of a seed that is not shown are no strangers.
+    let said = place.done(&["report", "tiny.toml", "--seeds", "12", "--out", "again"]);
+    assert!(said.contains("3 of 3 runs"), "{said}");
 }
 
 #[test]
