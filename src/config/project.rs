@@ -45,7 +45,8 @@ impl ProjectFile {
         let refuse = |why: String| Error::Usage(format!("{}: {why}", path.display()));
         let mut settings = read_table(path)?;
         if settings.get(TASK).is_some_and(toml::Value::is_table) {
-            let message = "[task] defines a task, which belongs in a file of its own: write task = \"FILE.toml\" here";
+            let message = "[task] defines a task, which belongs in a file of its own: write task = \"FILE.toml\" here, or pipeline = \"FILE.toml\" where that \
+                           file has all settings";
             return Err(refuse(message.into()));
         }
         let mut flags = [const { None }; FLAGS.len()];
