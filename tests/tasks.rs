@@ -131,6 +131,8 @@ fn a_task_of_ones_own_goes_through_every_stage_on_a_robot_of_ones_own() {
     run(&["convert", "--recordings", &at("recordings"), "--out", &at("dataset")]);
     let found = dataset::read(&dir.path().join("dataset/train")).expect("a dataset");
     assert_eq!((found.task.as_str(), found.layout.name.as_str()), ("coffee", "coffee"));
+    let said = hilt(&["inspect", &at("dataset"), "--json"]).output().expect("it runs").stdout;
+    assert!(String::from_utf8_lossy(&said).contains("\"instruction\": \"Pick up the cup"), "what the file of the task says");
     let few = ["pretrain.epochs=1", "train.warm_start_updates=20", "train.epochs=1", "train.min_updates=0"];
     let few: Vec<&str> = few.iter().flat_map(|set| ["--set", set]).collect();
     let dynamics = at("dynamics.safetensors");

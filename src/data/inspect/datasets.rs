@@ -4,9 +4,8 @@ use super::answer::answer;
 use super::foreign;
 use super::statistics::{Columns, statistics};
 use crate::data::dataset;
-use crate::data::dataset::foreign::is_foreign;
+use crate::data::dataset::foreign::{instructions, is_foreign};
 use crate::error::{Error, Result};
-use crate::task::built_in;
 use serde_json::{Value, json};
 use std::path::Path;
 
@@ -36,7 +35,7 @@ pub(super) fn one(root: &Path) -> Result<Value> {
     }
     let rest = json!({
         "task": found.task,
-        "instruction": built_in::find(&found.task).ok().map(|task| task.instruction.clone()),
+        "instruction": instructions(root)?.first(),
         "fps": found.fps,
         "episodes": lengths.len(),
         "frames": lengths.iter().sum::<f64>() as u64,
