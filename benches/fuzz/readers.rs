@@ -111,15 +111,16 @@ impl Reader {
                     |epoch| live_file::line("hil", [epoch, 9], 20 * epoch, [("l_bc", 0.5), ("l_sc", f64::NAN)].into_iter());
                 self.whole = (1..10).map(line).collect::<String>().into_bytes();
             }
+            "project" => {
+                let text = Pipeline::defaults(&stack()).to_toml(None).expect("TOML");
+                let mut table: toml::Table = text.parse().expect("TOML");
+                // Its task is a name.
+                table.insert("task".into(), "stack".into());
+                (self.whole, self.other) = (table.to_string().into_bytes(), text.into_bytes());
+            }
             _ => {
                 self.whole = Pipeline::defaults(&stack()).to_toml(None).expect("TOML").into_bytes();
                 self.other = self.whole.clone();
-                if self.name == "project" {
-                    // Its task is a name.
-                    let mut table: toml::Table = Pipeline::defaults(&stack()).to_toml(None).expect("TOML").parse().expect("TOML");
-                    table.insert("task".into(), "stack".into());
-                    self.whole = table.to_string().into_bytes();
-                }
             }
         }
         if let Some((tensors, meta)) = &self.network {

@@ -69,7 +69,7 @@ impl SettingsArgs {
             Some(none) if none.as_os_str() == NO_CONFIG => None,
             Some(file) => Some(file.clone()),
             None if self.pipeline.is_some() => None,
-            None => ProjectFile::above(&std::env::current_dir().ok()?),
+            None => ProjectFile::here(),
         }
     }
 
@@ -95,10 +95,8 @@ impl SettingsArgs {
         let file = self.pipeline_file(said);
         let unsaid = self.task.is_none() && file.is_none();
         let own_task = said.and_then(|project| project.task.clone());
-        let made_for = match artefact.filter(|_| unsaid) {
-            Some((path, kind)) => Some(MadeFor::read(path, kind, own_task.as_deref())?),
-            None => None,
-        };
+        let read = |(path, kind)| MadeFor::read(path, kind, own_task.as_deref());
+        let made_for = artefact.filter(|_| unsaid).map(read).transpose()?;
         let made = made_for.as_ref();
         let task = self.task.clone().or_else(|| made.map(|made| made.task.clone())).or(own_task);
         let robot = self.robot.clone().or_else(|| made?.robot.clone()).or_else(|| said?.robot.clone());

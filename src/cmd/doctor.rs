@@ -133,8 +133,7 @@ fn terminal() -> Finding {
 
 /// The `hilt.toml` that counts here, which may lie in a directory above.
 fn project() -> Finding {
-    let found = std::env::current_dir().ok().and_then(|dir| ProjectFile::above(&dir));
-    let Some(file) = found else { return finding("settings", "no hilt.toml here or above", true, (State::Ok, "")) };
+    let Some(file) = ProjectFile::here() else { return finding("settings", "no hilt.toml here or above", true, (State::Ok, "")) };
     let read = ProjectFile::read(&file);
     let is = read.as_ref().err().map_or_else(|| file.display().to_string(), ToString::to_string);
     finding("settings", is, read.is_ok(), (State::Bad, "mend the file, or give --config none"))

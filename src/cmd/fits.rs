@@ -1,6 +1,6 @@
 //! Whether an input fits: refuses what was made for another task, by another robot, or of other rows.
 
-use crate::config::Pipeline;
+use crate::config::{ChosenRobot, Pipeline};
 use crate::data::origin::{Kind, provenance};
 use crate::data::{ContentHash, Provenance, weights};
 use crate::error::{Error, Result};
@@ -84,17 +84,20 @@ pub fn robot_of(made: &Provenance) -> String {
     made.settings["robot"]["name"].as_str().map_or_else(|| paper_robot().name.clone(), String::from)
 }
 
+/// Whether this robot made it, whatever its files are called.
+pub fn made_by(made: &Provenance, robot: &ChosenRobot) -> bool {
+    match made.settings["robot"]["content"].as_str() {
+        None => robot.is_default(),
+        Some(content) => content == robot.content(),
+    }
+}
+
 /// Refuses what another robot made; what does not say by whom was made by the Jaco, when there was no other.
 ///
 /// # Errors
 /// [`Error::Input`] naming both.
 pub fn same_robot(path: &Path, made: &Provenance, pipeline: &Pipeline) -> Result<()> {
-    let theirs = &made.settings["robot"];
-    let same = match theirs["content"].as_str() {
-        None => pipeline.robot.is_default(),
-        Some(content) => content == pipeline.robot.content(),
-    };
-    if same {
+    if made_by(made, &pipeline.robot) {
         return Ok(());
     }
     let (theirs, ours) = (&robot_of(made), &pipeline.robot.name);

@@ -1,3 +1,4 @@
+use super::fits::made_by;
 use super::listen::ListenArgs;
 use super::places::Places;
 use super::{Context, Outcome, evaluate, train};
@@ -99,11 +100,7 @@ fn robot(args: &Args, policy: &Policy, made: &Provenance) -> Result<Option<Chose
     let advice =
         format!("{}: was made by robot {theirs}; give --robot with its TOML file, for its limits", args.policy.display());
     let robot = ChosenRobot::read(said).map_err(|why| Error::Usage(format!("{advice} ({said}: {why})")))?;
-    let same = match made.settings["robot"]["content"].as_str() {
-        None => robot.is_default(),
-        Some(content) => content == robot.content(),
-    };
-    if same {
+    if made_by(made, &robot) {
         Ok(Some(robot))
     } else {
         Err(Error::Usage(format!("{advice} ({said} is another robot, or its files have changed since)")))

@@ -66,7 +66,8 @@ pub fn explain(asked: &str, task: Option<&ChosenTask>) -> Result<Vec<Explained>>
     let sections = defaults.to_table()?;
     // A task is a file of its own, and explained by docs/add-a-task.md.
     let keys = leaves(&sections).into_iter().filter(|(key, _)| key.contains('.') && is_asked(key));
-    let all: Vec<Explained> = keys.map(|(key, default)| explained(&schema, &key, &default, &presets)).collect();
+    let measured = measured();
+    let all: Vec<Explained> = keys.map(|(key, default)| explained((&schema, &measured), &key, &default, &presets)).collect();
     if all.is_empty() {
         let hint = hint(asked);
         return Err(Error::Usage(format!("--explain {asked}: unknown key{hint} (`hilt settings --explain` explains all keys)")));
@@ -75,7 +76,7 @@ pub fn explain(asked: &str, task: Option<&ChosenTask>) -> Result<Vec<Explained>>
 }
 
 fn explained(
-    schema: &Value,
+    (schema, measured): (&Value, &[(String, String)]),
     key: &str,
     default: &toml::Value,
     presets: &[(&'static str, Vec<(String, toml::Table)>)],
@@ -100,7 +101,7 @@ fn explained(
         allowed: Range::of(key).map(|range| range.to_string()),
         default: default.to_string(),
         presets: presets.iter().map(|(name, tables)| OfPreset { name, values: values(tables) }).collect(),
-        measured: measured().into_iter().find_map(|(of, text)| (of == key).then_some(text)),
+        measured: measured.iter().find_map(|(of, text)| (of == key).then(|| text.clone())),
     }
 }
 

@@ -49,7 +49,7 @@ impl Pipeline {
         let mut pipeline = check::resolve(table.clone(), &origin)?;
         if let Some(project) = project {
             lay_over(&mut table, project.settings.clone());
-            pipeline = check::resolve(table.clone(), &project.origin())?;
+            pipeline = check::resolve(table.clone(), &project.path.display().to_string())?;
         }
         for set in sets {
             let origin = format!("--set {}", shown(set));

@@ -37,6 +37,11 @@ impl ProjectFile {
         dir.ancestors().map(|dir| dir.join(NAME)).find(|file| file.is_file())
     }
 
+    /// That of the working directory.
+    pub fn here() -> Option<PathBuf> {
+        Self::above(&std::env::current_dir().ok()?)
+    }
+
     /// Reads one, and checks its settings.
     ///
     /// # Errors
@@ -72,11 +77,6 @@ impl ProjectFile {
         lay_over(&mut all, settings.clone());
         check::resolve(all, &path.display().to_string())?;
         Ok(ProjectFile { path: path.into(), task, robot, preset, pipeline, settings })
-    }
-
-    /// As an error names where settings were written.
-    pub(super) fn origin(&self) -> String {
-        self.path.display().to_string()
     }
 }
 

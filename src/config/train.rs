@@ -127,7 +127,7 @@ impl Default for TrainSettings {
 /// leave a hand before the block whose fingers close half; 250 and 380 solve 190 and 198 of 200, of sort 172 and 192 (docs/notes.md).
 const PASSES: u64 = 380;
 /// Its fewest updates: what the paper's three tasks were found to need, with few demos too.
-pub(super) const LEAST_UPDATES: u64 = 15_000;
+const LEAST_UPDATES: u64 = 15_000;
 /// Its most updates: a few minutes. LeRobot's own default is as long.
 pub(super) const MOST_AUTO_UPDATES: u64 = 100_000;
 

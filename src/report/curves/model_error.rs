@@ -1,12 +1,12 @@
 //! The error of a dynamics network by groups of the state, beside that of a state that does not change: bars on a terminal, and a picture.
 
+use super::sources::{ends_in, files_in, stem};
 use super::terminal::{Style, painted};
 use crate::data::table_file;
 use crate::error::{Error, Result};
 use crate::interrupt::Interrupt;
 use crate::report::chart::{Datum, LOOKS, Picture, Row, Rows, tick};
 use crate::table::{Table, Values};
-use std::fs;
 use std::path::{Path, PathBuf};
 
 /// Ending of the tables of errors that `hilt pretrain` writes.
@@ -43,7 +43,7 @@ pub struct GroupErrors {
 
 /// Whether a file is such a table, by its name.
 pub fn holds_model_errors(path: &Path) -> bool {
-    path.to_str().is_some_and(|name| name.ends_with(ENDING))
+    ends_in(path, &[ENDING])
 }
 
 /// The tables among the files that are named, and those of the runs.
@@ -56,8 +56,7 @@ pub fn model_errors(named: &[PathBuf], interrupt: &Interrupt) -> Result<Vec<Mode
         interrupt.check()?;
         let mut files = vec![path.clone()];
         if path.is_dir() {
-            let entries = fs::read_dir(path).map_err(|e| Error::io(path, "read", e))?;
-            files = entries.filter_map(|entry| entry.ok()).map(|entry| entry.path()).collect();
+            files = files_in(path)?;
             files.sort();
         }
         for file in files.iter().filter(|file| holds_model_errors(file)) {
@@ -70,8 +69,7 @@ pub fn model_errors(named: &[PathBuf], interrupt: &Interrupt) -> Result<Vec<Mode
 
 /// `dynamics` of `runs/stack/dynamics.errors.parquet`; of several, with the run before.
 fn name_of(file: &Path, several: bool) -> String {
-    let stem = file.file_name().unwrap_or_default().to_string_lossy().trim_end_matches(ENDING).to_string();
-    let run = file.parent().and_then(Path::file_name).filter(|_| several);
+    let (stem, run) = (stem(file), file.parent().and_then(Path::file_name).filter(|_| several));
     run.map_or(stem.clone(), |run| format!("{} {stem}", run.to_string_lossy()))
 }
 

@@ -70,11 +70,11 @@ fn of_run(dir: &Path) -> Result<Vec<PathBuf>> {
     Ok(found)
 }
 
-fn ends_in(file: &Path, endings: &[&str]) -> bool {
+pub(super) fn ends_in(file: &Path, endings: &[&str]) -> bool {
     file.to_str().is_some_and(|name| endings.iter().any(|ending| name.ends_with(ending)))
 }
 
-fn files_in(dir: &Path) -> Result<Vec<PathBuf>> {
+pub(super) fn files_in(dir: &Path) -> Result<Vec<PathBuf>> {
     let entries = fs::read_dir(dir).map_err(|e| Error::io(dir, "read", e))?;
     Ok(entries.filter_map(|entry| entry.ok()).map(|entry| entry.path()).filter(|path| path.is_file()).collect())
 }
@@ -125,7 +125,7 @@ fn read(path: &Path) -> Result<Source> {
 }
 
 /// `policy-bc` of `policy-bc.training.parquet`.
-fn stem(path: &Path) -> String {
+pub(super) fn stem(path: &Path) -> String {
     let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
     name.split('.').next().unwrap_or_default().to_string()
 }
