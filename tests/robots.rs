@@ -2,7 +2,9 @@
 
 use assert_cmd::Command;
 use hilt::data::{dataset, recording};
+use hilt::interrupt::Interrupt;
 use hilt::joints::Joints;
+use hilt::robot::Robot;
 use hilt::robot::file;
 use hilt::robot::file::description::Read;
 use hilt::robot::model::{JointKind, Shape};
@@ -185,15 +187,18 @@ fn check_says_what_is_doubtful_and_draws_the_robot() {
     };
     let sound = said(Path::new("fixtures/robots/five.toml"));
     assert!(sound.contains("nothing doubtful") && sound.contains("opposing fingers: left and right"), "{sound}");
+    assert!(sound.contains("trial, pick-up: the demonstrator solves "), "{sound}");
     assert!(sound.contains("0.45 m") && sound.contains('#'), "{sound}");
     let doubtful = spoilt(
         dir.path(),
         &[
             ("xyz_m = [0.0, 0.0, 0.11]", "xyz_m = [0.0, 0.0, 0.03]"),
             ("armature = 0.1", "armature = 0.0"),
+            ("friction = 2.0", ""),
             ("0.44781, 1.64861", "0.44781, 1.2"),
         ],
         &[
+            ("velocity=\"0.2\" effort=\"20\"", "velocity=\"0.2\" effort=\"900\""),
             ("effort=\"60\"", "effort=\"2\""),
             ("ixx=\"0.02\" iyy=\"0.02\"", "ixx=\"0.09\" iyy=\"0.02\""),
             ("<axis xyz=\"0 -1 0\"/>", "<axis xyz=\"0 1 0\"/>"),
@@ -201,7 +206,12 @@ fn check_says_what_is_doubtful_and_draws_the_robot() {
     );
     let said = said(&doubtful);
     for part in [
-        "no reflected inertia",
+        "no reflected inertia (armature) in the motors of turn, shoulder, elbow, bend, roll",
+        "armature = 0.1 under [motors.arm]",
+        "no dry friction in the motors of left, right",
+        "finger left presses with 900 N",
+        "effort = 80.00 under [joints.left]",
+        "trials of pick-up",
         "leans",
         "shoulder bears",
         "link upper: moments of inertia",
@@ -212,10 +222,87 @@ fn check_says_what_is_doubtful_and_draws_the_robot() {
     }
 
     let png = dir.path().join("five.png");
-    hilt(&["robot", "check", "fixtures/robots/five.toml", "--json", "--png", png.to_str().expect("plain")]).assert().success();
+    let (five, untried) = ("fixtures/robots/five.toml", ["--episodes", "0", "--json"]);
+    let said =
+        hilt(&[&["robot", "check", five, "--png", png.to_str().expect("plain")][..], &untried].concat()).assert().success();
+    assert!(String::from_utf8_lossy(&said.get_output().stdout).contains("\"trial\": null"), "{said}");
+    hilt(&["robot", "check", five, "--task", "juggle"]).assert().code(2);
     assert!(fs::read(&png).expect("a picture").starts_with(b"\x89PNG"));
     hilt(&["robot", "check", "puma"]).assert().code(2);
     hilt(&["robot", "check", "gone.toml"]).assert().code(1);
+}
+
+/// What `hilt robot draft` says of a URDF.
+fn drafted(urdf: &Path) -> String {
+    let output = hilt(&["robot", "draft", urdf.to_str().expect("plain")]).output().expect("it runs");
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    String::from_utf8(output.stdout).expect("text")
+}
+
+/// From a URDF alone to a robot that grasps: with six joints and a thumb against two fingers, with fingers that slide, with five joints, a mesh and a
+/// camera that nods.
+#[test]
+fn a_draft_from_the_urdf_alone_is_a_robot_that_grasps() {
+    let dir = tempfile::tempdir().expect("a directory");
+    let built_in = Path::new("pipelines/robots");
+    for (name, from) in [("jaco", built_in), ("ur5e", built_in), ("five", Path::new("fixtures/robots"))] {
+        let urdf = dir.path().join(name).with_extension("urdf");
+        fs::copy(from.join(name).with_extension("urdf"), &urdf).expect("a file");
+        fs::copy("fixtures/robots/wrist.stl", dir.path().join("wrist.stl")).expect("a file");
+        let toml = urdf.with_extension("toml");
+        fs::write(&toml, drafted(&urdf)).expect("a file");
+        let (known, made) = (file::read(&from.join(name).with_extension("toml")), file::read(&toml));
+        let (known, made) = (known.expect("a robot").robot, made.expect("a robot").robot);
+        let joints = |robot: &Robot| robot.joints.iter().map(|joint| joint.name.clone()).collect::<Vec<_>>();
+        assert_eq!((made.arm, joints(&made)), (known.arm, joints(&known)), "{name}");
+        // The tool is between the pads, where a person put it, to 2 cm; and it waits with the hand down.
+        let (of_draft, of_person) = (nalgebra::Vector3::from(made.tool_m), nalgebra::Vector3::from(known.tool_m));
+        assert!((of_draft - of_person).norm() < 0.0201, "{name}: {of_draft} for {of_person}");
+        let tool = made.tool_pose(&made.ready);
+        assert!((tool.rotation * nalgebra::Vector3::z()).angle(&nalgebra::Vector3::z()) < 1e-3, "{name}: {tool}");
+
+        let said = hilt(&["robot", "check", toml.to_str().expect("plain"), "--json"]).output().expect("it runs").stdout;
+        let said: serde_json::Value = serde_json::from_slice(&said).expect("JSON");
+        assert!(said["trial"]["solved"].as_u64() >= Some(18), "{name}: {said}");
+    }
+}
+
+#[test]
+fn what_cannot_be_drafted_is_refused() {
+    let dir = tempfile::tempdir().expect("a directory");
+    let of = |urdf: &[(&str, &str)]| {
+        spoilt(dir.path(), &[], urdf);
+        file::draft(&dir.path().join("five.urdf"), &Interrupt::default()).map_err(|why| why.to_string())
+    };
+    assert!(of(&[]).is_ok_and(|toml| toml.contains("fingers = [\"left\", \"right\"]") && toml.contains("camera_tilt = 0.0")));
+    for (spoiling, part) in [
+        // One jaw against a fixed one: nothing branches off.
+        (
+            &[
+                ("name=\"right\" type=\"prismatic\"", "name=\"right\" type=\"fixed\""),
+                ("name=\"camera_tilt\" type=\"revolute\"", "name=\"camera_tilt\" type=\"fixed\""),
+            ][..],
+            "no two joints branch off",
+        ),
+        (&[("<axis xyz=\"0 -1 0\"/>", "<axis xyz=\"1 0 0\"/>")], "no two of the 3 fingers close on each other"),
+        (&[("package://five_description/wrist.stl", "package://five_description/gone.stl")], "gone.stl is not there"),
+        (&[("<parent link=\"foot\"/>", "<parent link=\"palm\"/>")], "loop"),
+    ] {
+        let why = of(spoiling).expect_err("refused");
+        assert!(why.contains(part), "{part} is not in {why}");
+    }
+    hilt(&["robot", "draft", "gone.urdf"]).assert().code(1);
+}
+
+/// The package of a mesh may stand above the directory in which one works.
+#[test]
+fn a_package_is_found_above_the_working_directory() {
+    let dir = tempfile::tempdir().expect("a directory");
+    let package = dir.path().join("five_description");
+    fs::create_dir_all(package.join("urdf")).expect("a directory");
+    spoilt(&package.join("urdf"), &[("five_description = \".\"", "")], &[]);
+    fs::rename(package.join("urdf/wrist.stl"), package.join("wrist.stl")).expect("it can be moved");
+    hilt(&["robot", "check", "five.toml", "--episodes", "0"]).current_dir(package.join("urdf")).assert().success();
 }
 
 /// A robot that nobody has, from files outside of the library: planned, executed in contact physics, recorded and read back.

@@ -8,6 +8,7 @@ use hilt::error::{Error, Result};
 use hilt::interrupt::Interrupt;
 use hilt::learn::{Checkpoint, Dynamics, Policy};
 use hilt::plan::{Plans, from_table};
+use hilt::robot::file as robot;
 use hilt::robot::file::built_in::paper_robot;
 use hilt::seed::stream;
 use hilt::table::Table;
@@ -22,8 +23,22 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
 
 /// Every reader.
-pub const NAMES: [&str; 10] =
-    ["recording", "plans", "dataset", "policy", "dynamics", "checkpoint", "summary", "metrics", "project", "settings"];
+pub const NAMES: [&str; 12] = [
+    "recording",
+    "plans",
+    "dataset",
+    "policy",
+    "dynamics",
+    "checkpoint",
+    "summary",
+    "metrics",
+    "project",
+    "settings",
+    "robot",
+    "urdf",
+];
+/// A URDF in so many is drafted from: that takes as long as reading hundreds.
+const DRAFTED: u64 = 50;
 /// One input in so many is left without a right seal.
 const UNSEALED: u32 = 16;
 /// Words for `--set`.
@@ -118,6 +133,13 @@ impl Reader {
                 table.insert("task".into(), "stack".into());
                 (self.whole, self.other) = (table.to_string().into_bytes(), text.into_bytes());
             }
+            "robot" | "urdf" => {
+                for name in ["five.toml", "five.urdf", "wrist.stl"] {
+                    fs::write(self.dir.join(name), sources::robot(name)).expect("a file of the robot");
+                }
+                self.whole = sources::robot(if self.name == "urdf" { "five.urdf" } else { "five.toml" });
+                self.other = sources::robot("five.urdf");
+            }
             _ => {
                 self.whole = Pipeline::defaults(&stack()).to_toml(None).expect("TOML").into_bytes();
                 self.other = self.whole.clone();
@@ -136,6 +158,7 @@ impl Reader {
     pub fn path(&self, number: u64) -> PathBuf {
         match self.part(number) {
             Some(part) => self.dir.join("dataset").join(part),
+            None if self.name == "urdf" => self.dir.join("five.urdf"),
             None => self.dir.join("input"),
         }
     }
@@ -162,7 +185,7 @@ impl Reader {
             "summary" => structure::other_json(whole, rng),
             "dataset" if whole.starts_with(b"{") => structure::other_json(whole, rng),
             "metrics" => structure::other_line(whole, rng),
-            "settings" | "project" => structure::other_toml(whole, rng),
+            "settings" | "project" | "robot" => structure::other_toml(whole, rng),
             _ => None,
         };
         let bytes = by_structure.unwrap_or_else(|| plain(rng));
@@ -258,6 +281,9 @@ impl Reader {
             "summary" => inspect(path, &Interrupt::default()).and_then(|_| json_file::read(path)).map(drop),
             "metrics" => live_file::read(path).map(drop),
             "project" => ProjectFile::read(path).map(drop),
+            "robot" => robot::read(path).map(drop),
+            "urdf" if number.is_multiple_of(DRAFTED) => robot::draft(path, &Interrupt::default()).map(drop),
+            "urdf" => robot::read(&self.dir.join("five.toml")).map(drop),
             _ if number % 2 == 1 => {
                 let sets = [String::from_utf8_lossy(input).into_owned()];
                 Pipeline::load(&Source::BuiltIn(stack().into(), Default::default()), &sets).map(drop)

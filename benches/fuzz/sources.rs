@@ -21,6 +21,11 @@ pub fn fixture(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("fixtures/pick-up").join(name)
 }
 
+/// A file of the robot that nobody has; its mesh stands beside it.
+pub fn robot(name: &str) -> Vec<u8> {
+    std::fs::read(Path::new(env!("CARGO_MANIFEST_DIR")).join("fixtures/robots").join(name)).expect("a fixture")
+}
+
 fn provenance(stage: &str) -> Provenance {
     Provenance::new(stage, "pick-up", json!({ "plan": { "speed": 1.0 } }), 3)
 }

@@ -169,7 +169,10 @@ impl SettingsArgs {
 }
 
 /// The task of `--task`.
-fn task_said(said: &str) -> Result<ChosenTask> {
+///
+/// # Errors
+/// [`Error::Usage`] when there is none of this name.
+pub fn task_said(said: &str) -> Result<ChosenTask> {
     ChosenTask::read(said).map_err(|why| Error::Usage(format!("--task: {why}")))
 }
 

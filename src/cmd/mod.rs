@@ -41,6 +41,7 @@ mod shard;
 mod simulate;
 mod subject;
 mod train;
+mod trial;
 mod unfinished;
 mod view;
 

@@ -1,9 +1,10 @@
 //! What there is to know about a robot before it is used: what is doubtful, where its hand gets to, how well it moves there.
 
-use super::collision::Solid;
+use super::collision::{Clash, Solid};
 use super::hand::opposing;
 use super::ik::Ik;
-use super::model::{Jacobian, JointKind, Robot};
+use super::model::{Jacobian, Joint, JointKind, Robot};
+use super::motors::{ARM_ARMATURE, FINGER_FRICTION, TooStrong, finger_armature, too_strong};
 use crate::error::Result;
 use crate::interrupt::Interrupt;
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
@@ -70,6 +71,7 @@ pub fn check(robot: &Arc<Robot>, interrupt: &Interrupt) -> Result<Findings> {
     let poses = robot.link_poses(&robot.ready);
     let mut doubts = Vec::new();
     doubt_numbers(robot, &mut doubts);
+    doubt_motors(robot, &mut doubts);
     doubt_ready(robot, &poses, &mut doubts);
     doubt_strength(robot, &poses, &mut doubts);
     let opposing = opposing(robot).into_iter().min_by(|a, b| a.cosine.total_cmp(&b.cosine));
@@ -119,9 +121,35 @@ fn doubt_numbers(robot: &Robot, doubts: &mut Vec<String>) {
         if joint.kind == JointKind::Revolute && !joint.continuous && high - low > WIDE_RAD {
             doubts.push(format!("joint {} turns by {:.1} rad: is it continuous?", joint.name, high - low));
         }
-        if joint.motor.armature == 0.0 {
-            doubts.push(format!("the motor of joint {} has no reflected inertia (armature): light links shake", joint.name));
+    }
+}
+
+/// What neither URDF nor TOML says of the motors is none, and few hands hold with that.
+fn doubt_motors(robot: &Robot, doubts: &mut Vec<String>) {
+    let named = |joints: Range<usize>, lacks: fn(&Joint) -> bool| {
+        let lacking: Vec<&str> =
+            robot.joints[joints].iter().filter(|joint| lacks(joint)).map(|joint| joint.name.as_str()).collect();
+        (!lacking.is_empty()).then(|| lacking.join(", "))
+    };
+    for (part, joints, begin) in [("arm", 0..robot.arm, ARM_ARMATURE), ("fingers", robot.fingers(), finger_armature(robot))] {
+        if let Some(names) = named(joints, |joint| joint.motor.armature == 0.0) {
+            doubts.push(format!(
+                "no reflected inertia (armature) in the motors of {names}: light links shake; to begin with: armature = {begin} under [motors.{part}]"
+            ));
         }
+    }
+    if let Some(names) = named(robot.fingers(), |joint| joint.motor.friction == 0.0) {
+        doubts.push(format!(
+            "no dry friction in the motors of {names}: what they hold pushes them open, and noise closes them; to begin with: {FINGER_FRICTION} of the \
+             effort as friction under [motors.fingers]"
+        ));
+    }
+    for TooStrong { joint, press_n, effort } in too_strong(robot) {
+        let name = &robot.joints[joint].name;
+        doubts.push(format!(
+            "finger {name} presses with {press_n:.0} N: grippers have 20 to 235 N, and what is pressed harder slips away; to begin with: effort = {effort:.2} \
+             under [joints.{name}]"
+        ));
     }
 }
 
@@ -141,21 +169,14 @@ fn doubt_ready(robot: &Robot, poses: &[Isometry3<f64>], doubts: &mut Vec<String>
             robot.links[*link].name
         ));
     }
-    let solids = |link: usize| robot.links[link].shapes.iter().map(move |shape| Solid::of(shape, &poses[link]));
-    let parent = |link: usize| link.checked_sub(1).map(|joint| robot.joints[joint].parent);
-    for a in 0..robot.links.len() {
-        if a > 0 && solids(a).any(|solid| solid.lowest_m() < 0.0) {
-            doubts.push(format!("in the ready pose link {} is in the table", robot.links[a].name));
-        }
-        for b in a + 1..robot.links.len() {
-            // What hangs on each other, or on the same link, touches by its nature; so do links two apart around a short one.
-            let kin = parent(b) == Some(a) || parent(a) == parent(b) || parent(b).and_then(parent) == Some(a);
-            let near = || solids(a).any(|one| solids(b).any(|other| !one.farther_than(&other, CLEAR_M)));
-            if !kin && near() {
-                let (a, b) = (&robot.links[a].name, &robot.links[b].name);
-                doubts.push(format!("in the ready pose link {a} comes within {:.0} mm of link {b}", CLEAR_M * 1e3));
+    for clash in robot.clashes(poses, CLEAR_M) {
+        let name = |link: usize| &robot.links[link].name;
+        doubts.push(match clash {
+            Clash::Table(link) => format!("in the ready pose link {} is in the table", name(link)),
+            Clash::Links(a, b) => {
+                format!("in the ready pose link {} comes within {:.0} mm of link {}", name(a), CLEAR_M * 1e3, name(b))
             }
-        }
+        });
     }
 }
 

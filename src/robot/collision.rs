@@ -66,6 +66,17 @@ impl Solid {
         }
     }
 
+    /// How far it reaches from the origin in a direction, a unit vector \[m\].
+    pub fn reach_m(&self, direction: &Vector3<f64>) -> f64 {
+        match self {
+            Solid::Capsule { from, to, radius_m } => direction.dot(&from.coords).max(direction.dot(&to.coords)) + radius_m,
+            Solid::Cuboid { pose, half_m } => {
+                let own = pose.rotation.inverse() * direction;
+                direction.dot(&pose.translation.vector) + own.abs().dot(half_m)
+            }
+        }
+    }
+
     /// Whether the two are at least `margin_m` apart.
     pub fn farther_than(&self, other: &Solid, margin_m: f64) -> bool {
         let ((a, reach_a), (b, reach_b)) = (self.sphere(), other.sphere());
@@ -95,6 +106,37 @@ impl Robot {
             self.links[link].shapes.iter().map(move |shape| (link, Solid::of(shape, &pose)))
         };
         poses.iter().enumerate().flat_map(of_link).collect()
+    }
+}
+
+/// What touches in a pose of a robot.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Clash {
+    /// A link reaches below the table on which the foot stands.
+    Table(usize),
+    /// Two links come near to each other, the one nearer to the foot first.
+    Links(usize, usize),
+}
+
+impl Robot {
+    /// What clashes at these poses of the links: links in the table, and links nearer to each other than `margin_m` that are not next to each other.
+    pub fn clashes(&self, poses: &[Isometry3<f64>], margin_m: f64) -> Vec<Clash> {
+        let solids = |link: usize| self.links[link].shapes.iter().map(move |shape| Solid::of(shape, &poses[link]));
+        let parent = |link: usize| link.checked_sub(1).map(|joint| self.joints[joint].parent);
+        let mut clashes = Vec::new();
+        for a in 0..self.links.len() {
+            if a > 0 && solids(a).any(|solid| solid.lowest_m() < 0.0) {
+                clashes.push(Clash::Table(a));
+            }
+            for b in a + 1..self.links.len() {
+                // What hangs on each other, or on the same link, touches by its nature; so do links two apart around a short one.
+                let kin = parent(b) == Some(a) || parent(a) == parent(b) || parent(b).and_then(parent) == Some(a);
+                if !kin && solids(a).any(|one| solids(b).any(|other| !one.farther_than(&other, margin_m))) {
+                    clashes.push(Clash::Links(a, b));
+                }
+            }
+        }
+        clashes
     }
 }
 

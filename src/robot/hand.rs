@@ -1,11 +1,14 @@
-//! Which fingers close on each other.
+//! Which fingers close on each other, and how strongly.
 
 use super::collision::Solid;
 use super::model::Robot;
 use nalgebra::{Isometry3, Vector3};
 
 /// Two fingers oppose each other when the cosine of the angle between their ways is below this: they come from different sides.
-const AGAINST: f64 = -0.1;
+pub const AGAINST: f64 = -0.1;
+
+/// Small movement of a finger, to see how far its pad goes \[rad, m\].
+const NUDGE: f64 = 1e-6;
 
 /// Two fingers that close on each other.
 pub struct Opposing {
@@ -30,6 +33,15 @@ pub fn opposing(robot: &Robot) -> Vec<Opposing> {
         room_m: (open[a] - open[b]).xy().norm(),
     });
     found.filter(|opposing| opposing.cosine < AGAINST).collect()
+}
+
+/// Force with which each finger can press at its pad in the open hand \[N\].
+pub fn press_n(robot: &Robot) -> Vec<f64> {
+    let mut nudged = robot.ready;
+    nudged[robot.arm..].iter_mut().for_each(|finger| *finger += NUDGE);
+    let moved =
+        pads(robot, &robot.ready).into_iter().zip(pads(robot, &nudged)).map(|(before, after)| (after - before).norm() / NUDGE);
+    moved.zip(robot.fingers()).map(|(lever, joint)| robot.joints[joint].effort / lever.max(f64::MIN_POSITIVE)).collect()
 }
 
 /// Where the pad of each finger is in the tool's frame \[m\]: the middle of the shape nearest to the tool.

@@ -7,6 +7,7 @@ pub mod file;
 mod hand;
 pub mod ik;
 pub mod model;
+mod motors;
 pub mod urdf;
 
 pub use ik::{Ik, Unreachable};
