@@ -34,8 +34,6 @@ const CLOSING_S: f64 = 0.5;
 /// A description, and what is worth saying about it.
 struct Drafted {
     description: Description,
-    /// Joints that are held.
-    held: BTreeMap<String, f64>,
     /// Room between the fingers of the open hand \[m\].
     room_m: f64,
     ready_found: bool,
@@ -55,16 +53,7 @@ pub(super) fn draft(path: &Path, urdf: &Urdf, mesh: FindMesh, interrupt: &Interr
     let branches = build(&description)?;
     let Grip { fingers, opened, closed, tool, room_m } = grip(&branches).map_err(refuse)?;
     let speed = closing_speed(&branches, &fingers, &opened, &closed);
-    let names = std::mem::take(&mut description.fingers);
-    for (i, name) in names.into_iter().enumerate() {
-        if fingers.contains(&i) {
-            description.fingers.push(name);
-        } else {
-            description.joints.remove(&name);
-            let at = element(urdf, &name).map_or(0.0, held_at);
-            description.fixed.insert(name, at);
-        }
-    }
+    hold_others(&mut description, &fingers, urdf);
     (description.tool, description.hand) = (tool, Hand { opened, closed, speed });
 
     let found = pose(&build(&description)?, interrupt)?;
@@ -74,10 +63,11 @@ pub(super) fn draft(path: &Path, urdf: &Urdf, mesh: FindMesh, interrupt: &Interr
             description.tool.rpy_rad = half_turned(description.tool.rpy_rad);
         }
         // The arm bends in its own plane where it can.
-        let straight = free.map(|joint| {
-            (description.arm[joint].clone(), 0.0f64.clamp(branches.joints[joint].limits[0], branches.joints[joint].limits[1]))
-        });
-        description.posture = straight.into_iter().collect();
+        let straight = |joint: usize| {
+            let [low, high] = branches.joints[joint].limits;
+            (description.arm[joint].clone(), 0.0f64.clamp(low, high))
+        };
+        description.posture = free.map(straight).into_iter().collect();
         description.ready = ready;
     }
     let unpowered = build(&description)?;
@@ -88,8 +78,7 @@ pub(super) fn draft(path: &Path, urdf: &Urdf, mesh: FindMesh, interrupt: &Interr
     if let Some(ready) = description.reach_m.and_then(|reach| settled(&robot, reach)) {
         description.ready = ready;
     }
-    let held = description.fixed.clone();
-    Ok(text::text(&Drafted { description, held, room_m, ready_found }))
+    Ok(text::text(&Drafted { description, room_m, ready_found }))
 }
 
 fn element<'a>(urdf: &'a Urdf, name: &str) -> Option<&'a JointElement> {
@@ -137,6 +126,20 @@ fn begun(
         joints,
         shapes: BTreeMap::new(),
         packages: BTreeMap::new(),
+    }
+}
+
+/// Of the branches of the hand these `fingers` close; the others are held.
+fn hold_others(description: &mut Description, fingers: &[usize], urdf: &Urdf) {
+    let branches = std::mem::take(&mut description.fingers);
+    for (i, name) in branches.into_iter().enumerate() {
+        if fingers.contains(&i) {
+            description.fingers.push(name);
+        } else {
+            description.joints.remove(&name);
+            let at = element(urdf, &name).map_or(0.0, held_at);
+            description.fixed.insert(name, at);
+        }
     }
 }
 

@@ -7,7 +7,7 @@ use std::fmt::Write;
 
 /// The file.
 pub fn text(drafted: &Drafted) -> String {
-    let Drafted { description, held, room_m, ready_found } = drafted;
+    let Drafted { description, room_m, ready_found } = drafted;
     let mut text = String::new();
     let mut line = |words: &str| writeln!(text, "{words}").expect("a text takes all lines");
     line(
@@ -40,12 +40,12 @@ pub fn text(drafted: &Drafted) -> String {
     line(&format!("opened = {}", numbers(&description.hand.opened)));
     line(&format!("closed = {}", numbers(&description.hand.closed)));
     line(&format!("speed = {}", number(description.hand.speed)));
-    if !held.is_empty() {
+    if !description.fixed.is_empty() {
         line(
             "\n# Joints that are neither the arm's nor a finger's. Those of a linkage are held half way, where the pads should stand parallel around a block.",
         );
         line("[fixed]");
-        held.iter().for_each(|(name, position)| line(&format!("{} = {}", key(name), number(*position))));
+        description.fixed.iter().for_each(|(name, position)| line(&format!("{} = {}", key(name), number(*position))));
     }
     if !description.posture.is_empty() {
         line("\n# More than six joints: this one settles what the tool's pose leaves free.");
