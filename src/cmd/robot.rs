@@ -47,7 +47,7 @@ struct CheckArgs {
     /// What the demonstrator tries with it: a task that comes with hilt, or the TOML file of another
     #[arg(long, value_name = "NAME|FILE.toml", default_value = "pick-up")]
     task: String,
-    /// How often it tries, as `hilt plan --seed 0` and `hilt simulate --seed 0` would; 0: not at all
+    /// How often it tries, as `hilt plan --seed 0` and `hilt simulate --seed 0 --set simulate.pulses.probability=0` would; 0: not at all
     #[arg(long, value_name = "N", default_value_t = 20, value_parser = clap::value_parser!(u64).range(..=1000))]
     episodes: u64,
     /// Print JSON
