@@ -60,7 +60,7 @@ struct CheckArgs {
 ///
 /// Save it beside the URDF, look at it with `hilt robot check`, and correct it by hand.
 #[derive(Debug, clap::Args)]
-#[command(after_help = "Example:\n  hilt robot draft arm.urdf > arm.toml")]
+#[command(after_help = "Example:\n  hilt robot draft pipelines/robots/ur5e.urdf > drafted.toml")]
 struct DraftArgs {
     /// The robot's URDF; expand xacro first
     #[arg(value_name = "FILE.urdf")]

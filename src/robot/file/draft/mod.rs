@@ -25,19 +25,12 @@ use std::collections::BTreeMap;
 use std::f64::consts::PI;
 use std::path::Path;
 use std::sync::Arc;
+use text::{Drafted, text};
 
 /// What the reach is less at both ends than on the map \[m\]: one step of its grid.
 const EDGE_M: f64 = 0.05;
 /// A finger closes in this time \[s\], unless half its highest speed is slower.
 const CLOSING_S: f64 = 0.5;
-
-/// A description, and what is worth saying about it.
-struct Drafted {
-    description: Description,
-    /// Room between the fingers of the open hand \[m\].
-    room_m: f64,
-    ready_found: bool,
-}
 
 /// The TOML that is to stand beside the URDF at `path`.
 ///
@@ -78,7 +71,7 @@ pub(super) fn draft(path: &Path, urdf: &Urdf, mesh: FindMesh, interrupt: &Interr
     if let Some(ready) = description.reach_m.and_then(|reach| settled(&robot, reach)) {
         description.ready = ready;
     }
-    Ok(text::text(&Drafted { description, room_m, ready_found }))
+    Ok(text(&Drafted { description, room_m, ready_found }))
 }
 
 fn element<'a>(urdf: &'a Urdf, name: &str) -> Option<&'a JointElement> {

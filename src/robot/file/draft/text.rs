@@ -1,9 +1,18 @@
 //! A description as a TOML file, with what was guessed and what is to be looked at.
 
-use super::Drafted;
-use crate::robot::file::description::{JointOverride, MotorEntry};
+use crate::robot::file::description::{Description, JointOverride, MotorEntry};
 use crate::robot::motors::FINGER_FRICTION;
 use std::fmt::Write;
+
+/// A description, and what is worth saying about it.
+pub struct Drafted {
+    /// The description.
+    pub description: Description,
+    /// Room between the fingers of the open hand \[m\].
+    pub room_m: f64,
+    /// Whether the ready pose is one; else it is the middle of all limits.
+    pub ready_found: bool,
+}
 
 /// The file.
 pub fn text(drafted: &Drafted) -> String {
