@@ -186,6 +186,7 @@ impl Reader {
             "dataset" if whole.starts_with(b"{") => structure::other_json(whole, rng),
             "metrics" => structure::other_line(whole, rng),
             "settings" | "project" | "robot" => structure::other_toml(whole, rng),
+            "urdf" => structure::other_xml(whole, rng),
             _ => None,
         };
         let bytes = by_structure.unwrap_or_else(|| plain(rng));

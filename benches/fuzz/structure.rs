@@ -1,6 +1,6 @@
 //! Whole files with another value in some place of what they describe themselves with.
 
-use super::mutate::{self, one_in, pick};
+use super::mutate::{self, below, one_in, pick};
 use super::sources;
 use hilt::table::{Table, Values};
 use rand::RngExt;
@@ -62,6 +62,26 @@ pub fn other_toml(whole: &[u8], rng: &mut ChaCha8Rng) -> Option<Vec<u8>> {
     let mut content = serde_json::to_value(table).ok()?;
     mutate::value(&mut content, rng);
     toml::to_string(&content).ok().map(String::into_bytes)
+}
+
+/// XML with another value in one of its attributes: one from elsewhere in it, hostile numbers in place of a number, or fewer or more of them.
+pub fn other_xml(whole: &[u8], rng: &mut ChaCha8Rng) -> Option<Vec<u8>> {
+    let mut parts: Vec<String> = std::str::from_utf8(whole).ok()?.split('"').map(String::from).collect();
+    // What stands between quotes is every second part.
+    let hit = 2 * below(parts.len() / 2, rng) + 1;
+    let other = parts[2 * below(parts.len() / 2, rng) + 1].clone();
+    let words: Vec<&str> = parts[hit].split(' ').collect();
+    let at = below(words.len(), rng);
+    let replaced = |with: String| {
+        words.iter().enumerate().map(|(i, w)| if i == at { with.clone() } else { (*w).into() }).collect::<Vec<_>>()
+    };
+    parts[hit] = match below(4, rng) {
+        0 => other,
+        1 => [parts[hit].clone(), other].join(" "),
+        2 => words[..at].join(" "),
+        _ => replaced(mutate::number(rng).to_string()).join(" "),
+    };
+    Some(parts.join("\"").into_bytes())
 }
 
 /// Weights whose last number is another.
