@@ -13,11 +13,11 @@ use std::ops::Range;
 use std::sync::Arc;
 
 /// Links nearer to each other than this in the ready pose are doubtful \[m\].
-const CLEAR_M: f64 = 0.005;
+pub const CLEAR_M: f64 = 0.005;
 /// A hand that leans more than this from straight down in the ready pose is doubtful \[rad\].
 const LEVEL_RAD: f64 = 0.02;
 /// Height of the tool over the table at which the reach is looked at \[m\]: a grasp of a block of 5 cm.
-const REACH_HEIGHT_M: f64 = 0.03;
+pub const REACH_HEIGHT_M: f64 = 0.03;
 /// Room of the reach map around the foot \[m\], and its grid.
 const REACH_X_M: [f64; 2] = [0.10, 1.00];
 const REACH_Y_M: [f64; 2] = [-0.60, 0.60];

@@ -24,10 +24,10 @@ use std::path::{Path, PathBuf, absolute};
 /// [`Error::Io`] for a file that cannot be read; [`Error::Input`] names the file, what is wrong in it, and what to do.
 pub fn read(path: &Path) -> Result<Read> {
     let description = Description::parse(&text_of(path)?).map_err(|why| Error::input(path, why))?;
-    let directory = &directory_of(path);
+    let directory = path.parent().unwrap_or(Path::new("."));
     let urdf = directory.join(&description.urdf);
     let document = xml::read(&text_of(&urdf)?).map_err(|why| Error::input(&urdf, why))?;
-    let places = [directory.to_path_buf(), directory_of(&urdf)];
+    let places = [directory_of(path), directory_of(&urdf)];
     let mesh = |name: &str| mesh_path(name, &description.packages, &places);
     assemble(&description, &document, &mesh).map_err(|why| Error::input(path, why))
 }

@@ -3,6 +3,7 @@
 use crate::error::Result;
 use crate::interrupt::Interrupt;
 use crate::joints::Joints;
+use crate::robot::check::{CLEAR_M, REACH_HEIGHT_M};
 use crate::robot::ik::Ik;
 use crate::robot::model::{Joint, Robot};
 use crate::seed;
@@ -21,12 +22,9 @@ const HEIGHT_M: f64 = 0.30;
 const BEGINNINGS: u64 = 80;
 /// Solutions nearer to each other than this are one \[rad\].
 const SAME_RAD: f64 = 0.05;
-/// Links of a pose are to stay this far from each other \[m\].
-const CLEAR_M: f64 = 0.005;
-/// Where the hand should get to on the table, in front of the foot and to the sides of it \[m\], and how high the tool is there.
+/// Where the hand should get to on the table, in front of the foot and to the sides of it \[m\].
 const TABLE_X_M: [f64; 6] = [0.2, 0.3, 0.4, 0.5, 0.6, 0.7];
 const TABLE_Y_M: [f64; 3] = [-0.25, 0.0, 0.25];
-const TABLE_Z_M: f64 = 0.03;
 
 /// A pose to begin with.
 pub struct Pose {
@@ -111,7 +109,7 @@ fn unwound(robot: &Robot, mut q: Joints) -> Joints {
 
 fn score(robot: &Robot, ik: &mut Ik, ready: &Joints, turned: bool) -> Score {
     let clashes = |q: &Joints| robot.clashes(&robot.link_poses(q), CLEAR_M).len() as i64;
-    let table = TABLE_X_M.iter().flat_map(|x| TABLE_Y_M.map(|y| [*x, y, TABLE_Z_M]));
+    let table = TABLE_X_M.iter().flat_map(|x| TABLE_Y_M.map(|y| [*x, y, REACH_HEIGHT_M]));
     let reached = table.filter(|at| ik.solve(&down(*at, turned), ready).is_ok_and(|q| clashes(&q) == 0)).count() as i64;
     let poses = robot.link_poses(ready);
     let height_cm = poses[1..=robot.arm].iter().map(|pose| pose.translation.z * 100.0).sum::<f64>().round() as i64;
