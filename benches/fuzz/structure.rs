@@ -70,17 +70,15 @@ pub fn other_xml(whole: &[u8], rng: &mut ChaCha8Rng) -> Option<Vec<u8>> {
     // What stands between quotes is every second part.
     let hit = 2 * below(parts.len() / 2, rng) + 1;
     let other = parts[2 * below(parts.len() / 2, rng) + 1].clone();
-    let words: Vec<&str> = parts[hit].split(' ').collect();
+    let mut words: Vec<String> = parts[hit].split(' ').map(String::from).collect();
     let at = below(words.len(), rng);
-    let replaced = |with: String| {
-        words.iter().enumerate().map(|(i, w)| if i == at { with.clone() } else { (*w).into() }).collect::<Vec<_>>()
-    };
-    parts[hit] = match below(4, rng) {
-        0 => other,
-        1 => [parts[hit].clone(), other].join(" "),
-        2 => words[..at].join(" "),
-        _ => replaced(mutate::number(rng).to_string()).join(" "),
-    };
+    match below(4, rng) {
+        0 => words = vec![other],
+        1 => words.push(other),
+        2 => words.truncate(at),
+        _ => words[at] = mutate::number(rng).to_string(),
+    }
+    parts[hit] = words.join(" ");
     Some(parts.join("\"").into_bytes())
 }
 

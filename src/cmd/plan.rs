@@ -6,7 +6,8 @@ use super::{Context, Outcome, dropped};
 use crate::config::{Pipeline, Stage};
 use crate::data::{Provenance, table_file};
 use crate::error::{Error, Result};
-use crate::plan::{Block, Plan, Planned, Planner, block_from_table, block_to_table, to_table};
+use crate::interrupt::Interrupt;
+use crate::plan::{Block, Plan, PlanError, Planned, Planner, block_from_table, block_to_table, to_table};
 use crate::seed;
 use crate::tasks::draw_scene;
 use rayon::prelude::*;
@@ -119,11 +120,7 @@ impl PlanStage<'_> {
     }
 
     fn plan_one(&self, planner: &mut Planner, episode: u64) -> Result<dropped::Kept<Plan>> {
-        self.context.interrupt.check()?;
-        let mut rng = seed::stream(self.seed, "plan.scene", episode);
-        let scene = draw_scene(&self.pipeline.robot, &self.pipeline.task, &self.pipeline.scene, &mut rng)?;
-        let plan = planner.plan(episode, &scene, &mut seed::stream(self.seed, "plan.search", episode));
-        self.context.interrupt.check()?;
+        let plan = plan_episode(planner, self.pipeline, (self.seed, episode), &self.context.interrupt)?;
         Ok(plan.map_err(|e| format!("episode {episode}: {e}")))
     }
 
@@ -168,6 +165,23 @@ impl PlanStage<'_> {
         table_file::write_groups(out, groups, self.provenance)?;
         Ok(reasons)
     }
+}
+
+/// The plan of an episode of a seed, or why there is none.
+///
+/// # Errors
+/// [`crate::error::Error::Usage`] when there is no room for the scene; [`crate::error::Error::Interrupted`].
+pub fn plan_episode(
+    planner: &mut Planner,
+    of: &Pipeline,
+    (seed, episode): (u64, u64),
+    interrupt: &Interrupt,
+) -> Result<std::result::Result<Plan, PlanError>> {
+    interrupt.check()?;
+    let scene = draw_scene(&of.robot, &of.task, &of.scene, &mut seed::stream(seed, "plan.scene", episode))?;
+    let plan = planner.plan(episode, &scene, &mut seed::stream(seed, "plan.search", episode));
+    interrupt.check()?;
+    Ok(plan)
 }
 
 /// The plans; the reasons of the others go to `reasons`.

@@ -9,6 +9,7 @@ use crate::data::origin::Kind;
 use crate::data::{Provenance, atomic, recording, table_file};
 use crate::demo::Episode;
 use crate::error::{Error, Result};
+use crate::interrupt::Interrupt;
 use crate::plan::{Plan, Plans};
 use crate::seed;
 use crate::sim::{Disturbance, Follower, run_episode};
@@ -102,6 +103,15 @@ fn follower(path: &Path, plan: &Plan) -> Result<Follower> {
     Follower::new(plan).ok_or_else(unusable)
 }
 
+/// Executes a plan with the noise of a seed.
+///
+/// # Errors
+/// [`Error::Interrupted`].
+pub fn execute(plan: &Plan, mut follower: Follower, of: &SimulateSettings, seed: u64, interrupt: &Interrupt) -> Result<Episode> {
+    let mut disturbance = Disturbance::new(&plan.scene.robot, of, seed::stream(seed, "simulate.noise", plan.index));
+    run_episode(plan.index, &plan.scene, &mut follower, &mut disturbance, of.max_steps, interrupt)
+}
+
 /// What is said of all episodes in the end.
 #[derive(Default)]
 struct Totals {
@@ -157,10 +167,8 @@ impl SimulateStage<'_> {
         let interrupt = &self.context.interrupt;
         interrupt.check()?;
         let name = recording::file_name(plan.index);
-        let noise = seed::stream(self.seed, "simulate.noise", plan.index);
-        let mut disturbance = Disturbance::new(&plan.scene.robot, self.settings, noise);
-        let mut follower = follower(&self.work.at(&name), plan)?;
-        let episode = run_episode(plan.index, &plan.scene, &mut follower, &mut disturbance, self.settings.max_steps, interrupt)?;
+        let follower = follower(&self.work.at(&name), plan)?;
+        let episode = execute(plan, follower, self.settings, self.seed, interrupt)?;
         self.totals.add(&episode);
         self.work.put(&name, &recording::encode(&self.work.at(&name), &episode, self.provenance)?, 1)
     }

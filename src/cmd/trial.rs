@@ -2,13 +2,13 @@
 //! demonstrations are given; and nothing is written.
 
 use super::Context;
+use super::plan::plan_episode;
+use super::simulate::execute;
 use crate::config::{ChosenTask, Pipeline, Preset, Source};
 use crate::error::Result;
 use crate::plan::Planner;
-use crate::seed;
-use crate::sim::{Disturbance, Follower, run_episode};
+use crate::sim::Follower;
 use crate::task::FailureClass;
-use crate::tasks::draw_scene;
 use rayon::prelude::*;
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -59,18 +59,12 @@ pub fn trial(robot: &str, task: ChosenTask, episodes: u64, context: &Context) ->
 }
 
 fn attempt(planner: &mut Planner, of: &Pipeline, episode: u64, context: &Context) -> Result<End> {
-    context.interrupt.check()?;
-    let scene = draw_scene(&of.robot, &of.task, &of.scene, &mut seed::stream(SEED, "plan.scene", episode))?;
-    let plan = planner.plan(episode, &scene, &mut seed::stream(SEED, "plan.search", episode));
-    context.interrupt.check()?;
-    let follower = plan.map_err(|why| why.to_string()).and_then(|plan| Follower::new(&plan).ok_or("the plan is empty".into()));
-    let mut follower = match follower {
-        Ok(follower) => follower,
-        Err(why) => return Ok(Err(why)),
+    let plan = match plan_episode(planner, of, (SEED, episode), &context.interrupt)? {
+        Ok(plan) => plan,
+        Err(why) => return Ok(Err(why.to_string())),
     };
-    let mut disturbance = Disturbance::new(&of.robot, &of.simulate, seed::stream(SEED, "simulate.noise", episode));
-    let done = run_episode(episode, &scene, &mut follower, &mut disturbance, of.simulate.max_steps, &context.interrupt)?;
-    Ok(Ok(done.failure))
+    let Some(follower) = Follower::new(&plan) else { return Ok(Err("the plan is empty".into())) };
+    Ok(Ok(execute(&plan, follower, &of.simulate, SEED, &context.interrupt)?.failure))
 }
 
 impl Trial {

@@ -18,10 +18,11 @@ pub const CLEAR_M: f64 = 0.005;
 const LEVEL_RAD: f64 = 0.02;
 /// Height of the tool over the table at which the reach is looked at \[m\]: a grasp of a block of 5 cm.
 pub const REACH_HEIGHT_M: f64 = 0.03;
-/// Room of the reach map around the foot \[m\], and its grid.
+/// Room of the reach map around the foot \[m\].
 const REACH_X_M: [f64; 2] = [0.10, 1.00];
 const REACH_Y_M: [f64; 2] = [-0.60, 0.60];
-const GRID_M: f64 = 0.05;
+/// Grid of the reach map \[m\].
+pub const GRID_M: f64 = 0.05;
 /// Manipulability below which the hand moves badly, as a share of the best on the map.
 const POOR: f64 = 0.25;
 /// Gravity \[m/s^2\].
@@ -201,7 +202,11 @@ fn doubt_strength(robot: &Robot, poses: &[Isometry3<f64>], doubts: &mut Vec<Stri
     }
 }
 
-fn reach(robot: &Arc<Robot>, interrupt: &Interrupt) -> Result<Reach> {
+/// Where the hand gets to.
+///
+/// # Errors
+/// [`crate::error::Error::Interrupted`].
+pub fn reach(robot: &Arc<Robot>, interrupt: &Interrupt) -> Result<Reach> {
     let line = |[low, high]: [f64; 2]| -> Vec<f64> {
         let steps = ((high - low) / GRID_M).round() as usize;
         (0..=steps).map(|k| low + k as f64 * GRID_M).collect()

@@ -13,22 +13,20 @@ use super::tree::foot;
 use super::xml::{JointElement, Urdf};
 use crate::error::{Error, Result};
 use crate::interrupt::Interrupt;
-use crate::robot::check::check;
+use crate::robot::check::{GRID_M, reach};
 use crate::robot::file::xml::isometry;
 use crate::robot::model::Robot;
 use crate::robot::motors::{ARM_ARMATURE, ARM_DAMPING, FINGER_FRICTION, finger_armature, too_strong};
 use grip::{Grip, grip};
 use nalgebra::{UnitQuaternion, Vector3};
 use pose::{Pose, pose, settled};
-use skeleton::{held_at, skeleton};
+use skeleton::{Skeleton, held_at, skeleton};
 use std::collections::BTreeMap;
 use std::f64::consts::PI;
 use std::path::Path;
 use std::sync::Arc;
 use text::{Drafted, text};
 
-/// What the reach is less at both ends than on the map \[m\]: one step of its grid.
-const EDGE_M: f64 = 0.05;
 /// A finger closes in this time \[s\], unless half its highest speed is slower.
 const CLOSING_S: f64 = 0.5;
 
@@ -41,8 +39,7 @@ pub(super) fn draft(path: &Path, urdf: &Urdf, mesh: FindMesh, interrupt: &Interr
     let build = |description: &Description| assemble(description, urdf, mesh).map(|read| Arc::new(read.robot)).map_err(refuse);
 
     let bones = foot(urdf).and_then(|foot| skeleton(urdf, foot)).map_err(refuse)?;
-    let stem = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
-    let mut description = begun(stem, path, bones.arm, bones.fingers, bones.fixed, urdf);
+    let mut description = begun(path, bones, urdf);
     let branches = build(&description)?;
     let Grip { fingers, opened, closed, tool, room_m } = grip(&branches).map_err(refuse)?;
     let speed = closing_speed(&branches, &fingers, &opened, &closed);
@@ -66,8 +63,9 @@ pub(super) fn draft(path: &Path, urdf: &Urdf, mesh: FindMesh, interrupt: &Interr
     let unpowered = build(&description)?;
     take_motors(&mut description, &unpowered, urdf);
     let robot = build(&description)?;
-    let reach = check(&robot, interrupt)?.reach.ahead_m;
-    description.reach_m = reach.map(|[near, far]| [near + EDGE_M, far - EDGE_M]).filter(|[near, far]| near < far);
+    // One step of the map's grid less at both ends.
+    let reach = reach(&robot, interrupt)?.ahead_m;
+    description.reach_m = reach.map(|[near, far]| [near + GRID_M, far - GRID_M]).filter(|[near, far]| near < far);
     if let Some(ready) = description.reach_m.and_then(|reach| settled(&robot, reach)) {
         description.ready = ready;
     }
@@ -79,21 +77,14 @@ fn element<'a>(urdf: &'a Urdf, name: &str) -> Option<&'a JointElement> {
 }
 
 /// A description that can be assembled, in which the joints alone are right.
-fn begun(
-    name: String,
-    path: &Path,
-    arm: Vec<String>,
-    fingers: Vec<String>,
-    fixed: BTreeMap<String, f64>,
-    urdf: &Urdf,
-) -> Description {
+fn begun(path: &Path, Skeleton { arm, fingers, fixed }: Skeleton, urdf: &Urdf) -> Description {
     let range = |name: &String| element(urdf, name).and_then(|joint| joint.range);
     let middle = |names: &[String]| -> Vec<f64> {
         names.iter().map(|name| range(name).map_or(0.0, |[low, high]| (low + high) / 2.0)).collect()
     };
     let (ready, opened) = (middle(&arm), middle(&fingers));
     // A joint that mimics another often has no limits of its own.
-    let lacks = |name: &&String| {
+    let lacks = |name: &String| {
         let joint = element(urdf, name)?;
         let other = element(urdf, joint.mimics.as_ref()?)?;
         let own = JointOverride {
@@ -101,11 +92,11 @@ fn begun(
             effort: other.effort.filter(|_| joint.effort.is_none()),
             ..JointOverride::default()
         };
-        (own.velocity.is_some() || own.effort.is_some()).then(|| (name.to_string(), own))
+        (own.velocity.is_some() || own.effort.is_some()).then(|| (name.clone(), own))
     };
-    let joints = fingers.iter().filter_map(|name| lacks(&name)).collect();
+    let joints = fingers.iter().filter_map(lacks).collect();
     Description {
-        name,
+        name: path.file_stem().unwrap_or_default().to_string_lossy().into_owned(),
         urdf: path.file_name().unwrap_or_default().into(),
         arm,
         fingers,
