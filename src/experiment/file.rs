@@ -2,14 +2,14 @@
 
 use super::report_kind::ReportKind;
 use super::seeds::Seeds;
-use super::spec::{Experiment, Overrides};
+use super::spec::{Experiment, MethodSets, Overrides};
 use super::variation::{self, Raw as RawVariation};
-use super::wording::{check_keys, check_name, distinct, is_name, not_empty, parsed, task_names};
+use super::wording::{check_keys, check_name, distinct, is_name, method_sets, not_empty, parsed, task_names};
 use crate::config::Preset;
 use crate::error::{Error, Result};
 use crate::words::{shown, unknown};
 use serde::Deserialize;
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -18,7 +18,7 @@ pub const DIRECTORY: &str = "pipelines/experiments";
 /// A file with every key has a few kB \[bytes\].
 const LONGEST_FILE: u64 = 1 << 20;
 /// Keys of an experiment.
-const KEYS: [&str; 13] = [
+const KEYS: [&str; 14] = [
     "description",
     "notes",
     "report",
@@ -29,6 +29,7 @@ const KEYS: [&str; 13] = [
     "seeds",
     "episodes",
     "set",
+    "method_set",
     "dataset",
     "record",
     "variation",
@@ -50,6 +51,8 @@ struct Raw {
     episodes: Option<u64>,
     #[serde(default)]
     set: Vec<String>,
+    #[serde(default)]
+    method_set: BTreeMap<String, Vec<String>>,
     dataset: Option<String>,
     #[serde(default)]
     record: bool,
@@ -139,6 +142,7 @@ fn of_text(name: &str, path: &Path, text: &str, overrides: &Overrides) -> std::r
         seeds,
         episodes: overrides.episodes.or(raw.episodes),
         set: raw.set,
+        method_set: MethodSets::new(),
         dataset: raw.dataset,
         record: raw.record,
         variations: Vec::new(),
@@ -151,6 +155,7 @@ fn of_text(name: &str, path: &Path, text: &str, overrides: &Overrides) -> std::r
     distinct("tasks", &experiment.tasks)?;
     distinct("methods", &raw.methods)?;
     distinct("presets", &experiment.presets)?;
+    experiment.method_set = method_sets(&raw.method_set, &experiment.methods)?;
     for variation in &raw.variation {
         let checked = variation.check(&experiment).map_err(|why| format!("variation \"{}\": {why}", shown(&variation.name)))?;
         experiment.variations.push(checked);

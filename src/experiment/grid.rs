@@ -5,6 +5,7 @@ use super::resolve::cell;
 use super::runs::{Grid, Run};
 use super::spec::{Experiment, Variation};
 use crate::error::{Error, Result};
+use crate::learn::MethodName;
 use std::collections::HashMap;
 use std::path::Path;
 
@@ -26,11 +27,14 @@ impl Grid {
         let mut cells = Vec::new();
         for (t, task) in experiment.tasks.iter().enumerate() {
             for (p, preset) in experiment.presets.iter().enumerate() {
-                let base = cell(experiment, task, preset, None)?;
+                let plain = |method: &MethodName| cell(experiment, task, preset, None, *method);
+                let base = experiment.methods.iter().map(plain).collect::<Result<Vec<_>>>()?;
                 for (v, variation) in variations.iter().enumerate() {
-                    if variation.is_none_or(|v| v.tasks.contains(task)) {
-                        let settings = cell(experiment, task, preset, *variation)?;
-                        cells.push(([t, p, v], settings, base.clone()));
+                    for (m, method) in experiment.methods.iter().enumerate() {
+                        if variation.is_none_or(|v| v.tasks.contains(task) && v.methods.contains(method)) {
+                            let settings = cell(experiment, task, preset, *variation, *method)?;
+                            cells.push(([t, p, v, m], settings, base[m].clone()));
+                        }
                     }
                 }
             }
@@ -38,18 +42,10 @@ impl Grid {
         let mut builder = Builder::new(experiment, dir);
         let mut runs = Vec::new();
         for (s, seed) in experiment.seeds.iter().enumerate() {
-            for ([t, p, v], settings, base) in &cells {
-                for (m, method) in experiment.methods.iter().enumerate() {
-                    if variations[*v].is_none_or(|v| v.methods.contains(method)) {
-                        let at = At {
-                            task: &experiment.tasks[*t],
-                            preset: &experiment.presets[*p],
-                            variation: variations[*v],
-                            seed: *seed,
-                        };
-                        runs.push(([*t, *p, *v, m, s], builder.run(&at, *method, settings, base)?));
-                    }
-                }
+            for ([t, p, v, m], settings, base) in &cells {
+                let (task, preset) = (&experiment.tasks[*t], &experiment.presets[*p]);
+                let at = At { task, preset, variation: variations[*v], seed: *seed };
+                runs.push(([*t, *p, *v, *m, s], builder.run(&at, experiment.methods[*m], settings, base)?));
             }
         }
         runs.sort_by_key(|(order, _)| *order);

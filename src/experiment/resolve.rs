@@ -1,6 +1,6 @@
-//! The settings of every stage for one task, preset and variation.
+//! The settings of every stage for one task, preset, variation and method.
 
-use super::spec::{Experiment, Variation};
+use super::spec::{Experiment, MethodSets, Variation};
 use crate::config::{ChosenTask, Pipeline, Preset, Source, Stage, is_file};
 use crate::error::{Error, Result};
 use crate::learn::MethodName;
@@ -70,11 +70,17 @@ pub struct StageSettings {
 /// The settings of all stages, by their order.
 pub type Cell = [StageSettings; 6];
 
-/// The settings of `task` under a preset, with a variation's over them.
+/// The settings of `task` under a preset, with a variation's over them; where both have settings of the method alone, these go over their others.
 ///
 /// # Errors
 /// [`Error::Usage`] names what is wrong and where.
-pub fn cell(experiment: &Experiment, task: &str, preset: &str, variation: Option<&Variation>) -> Result<Cell> {
+pub fn cell(
+    experiment: &Experiment,
+    task: &str,
+    preset: &str,
+    variation: Option<&Variation>,
+    method: MethodName,
+) -> Result<Cell> {
     let at = match variation {
         Some(variation) => format!("{}: variation \"{}\"", experiment.path.display(), variation.name),
         None => experiment.path.display().to_string(),
@@ -83,10 +89,18 @@ pub fn cell(experiment: &Experiment, task: &str, preset: &str, variation: Option
         Error::Usage(why) => Error::Usage(format!("{at}: {why}")),
         other => other,
     };
-    variation.map_or(Ok(()), check_variation).map_err(|why| Error::Usage(format!("{at}: {why}")))?;
+    let checked = check_method_set(&experiment.method_set).and_then(|()| variation.map_or(Ok(()), check_variation));
+    checked.map_err(|why| Error::Usage(format!("{at}: {why}")))?;
     let said = experiment.tasks.iter().zip(&experiment.said).find(|(name, _)| *name == task).map_or(task, |(_, said)| said);
     let (source, words) = source_of((task, said), preset).map_err(|why| Error::Usage(format!("{at}: {why}")))?;
-    let stages = Stage::ALL.map(|stage| stage_settings(experiment, stage, &source, &words, variation));
+    let own_of = |sets: &MethodSets| sets.get(&method).cloned().unwrap_or_default();
+    let stages = Stage::ALL.map(|stage| {
+        let varied = variation.filter(|v| v.stages.contains(&stage));
+        let varied = varied.map(|v| [v.set.clone(), own_of(&v.method_set)].concat()).unwrap_or_default();
+        let episodes = experiment.episodes.map(|n| format!("evaluate.episodes={n}"));
+        let sets = [experiment.set.clone(), Vec::from_iter(episodes), own_of(&experiment.method_set), varied].concat();
+        stage_settings(stage, &source, &words, &sets)
+    });
     let mut resolved = Vec::with_capacity(Stage::ALL.len());
     for stage in stages {
         resolved.push(stage.map_err(says)?);
@@ -94,17 +108,9 @@ pub fn cell(experiment: &Experiment, task: &str, preset: &str, variation: Option
     Ok(resolved.try_into().expect("a stage each"))
 }
 
-fn stage_settings(
-    experiment: &Experiment,
-    stage: Stage,
-    source: &Source,
-    words: &[String],
-    variation: Option<&Variation>,
-) -> Result<StageSettings> {
-    let own = variation.filter(|v| v.stages.contains(&stage)).map(|v| v.set.as_slice()).unwrap_or_default();
-    let episodes = experiment.episodes.map(|n| format!("evaluate.episodes={n}"));
-    let sets: Vec<String> = experiment.set.iter().chain(&episodes).chain(own).cloned().collect();
-    let pipeline = Pipeline::load(source, &sets)?;
+/// The settings of a stage with `sets` over those of the source.
+fn stage_settings(stage: Stage, source: &Source, words: &[String], sets: &[String]) -> Result<StageSettings> {
+    let pipeline = Pipeline::load(source, sets)?;
     check_ready_pose(&pipeline.robot, &pipeline.scene)?;
     // What another stage reads changes nothing here.
     let read = sets.iter().filter(|set| stage.sections().contains(&section_of(set)));
@@ -143,22 +149,36 @@ fn source_of((task, said): (&str, &str), preset: &str) -> std::result::Result<(S
 
 /// Every setting of a variation must be read by one of its stages, and do something for each of its methods.
 fn check_variation(variation: &Variation) -> std::result::Result<(), String> {
+    let stages: Vec<&str> = variation.stages.iter().map(|s| s.name()).collect();
     for set in &variation.set {
         let section = section_of(set);
         let is_section = Stage::ALL.iter().any(|stage| stage.sections().contains(&section));
         if is_section && !variation.stages.iter().any(|stage| stage.sections().contains(&section)) {
-            let stages: Vec<&str> = variation.stages.iter().map(|s| s.name()).collect();
             return Err(format!("set \"{}\" is read by none of its stages ({})", shown(set), stages.join(", ")));
         }
     }
-    let without_effect = |method: MethodName| all_of(&variation.set, &not_of(method));
-    match variation.methods.iter().find(|method| without_effect(**method)) {
+    if !variation.method_set.is_empty() && !variation.stages.contains(&Stage::Train) {
+        return Err(format!("method_set is read by none of its stages ({})", stages.join(", ")));
+    }
+    check_method_set(&variation.method_set)?;
+    let unchanged = |method: &MethodName| all_of(&variation.set, &not_of(*method)) && !variation.method_set.contains_key(method);
+    match variation.methods.iter().find(|method| unchanged(method)) {
         Some(method) => {
             let (method, set) = (method.name(), shown(&variation.set.join(" ")));
             Err(format!("\"{set}\" changes nothing of method {method}: limit the variation by methods = [...]"))
         }
         None => Ok(()),
     }
+}
+
+/// Every setting of a method alone must do something for it.
+fn check_method_set(sets: &MethodSets) -> std::result::Result<(), String> {
+    for (method, set) in sets {
+        if let Some(set) = set.iter().find(|set| all_of(std::slice::from_ref(*set), &not_of(*method))) {
+            return Err(format!("method_set: \"{}\" changes nothing of method {}", shown(set), method.name()));
+        }
+    }
+    Ok(())
 }
 
 fn all_of(set: &[String], families: &[&str]) -> bool {

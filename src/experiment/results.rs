@@ -59,7 +59,7 @@ fn row<'a>(run: &'a Run, train: &Step, evaluate: &Step) -> Result<Row<'a>> {
 }
 
 /// Updates of all stages of a training, by its metrics: each stage counts from 1, so the last of each. `None` for another table.
-pub fn updates(metrics: &Table) -> Option<u64> {
+fn updates(metrics: &Table) -> Option<u64> {
     let (Values::Text(stages), Values::I64(updates)) = (&metrics.column("stage")?.values, &metrics.column("updates")?.values)
     else {
         return None;

@@ -3,7 +3,11 @@
 use super::report_kind::ReportKind;
 use crate::config::Stage;
 use crate::learn::MethodName;
+use std::collections::BTreeMap;
 use std::path::PathBuf;
+
+/// Settings of `train` by the method that they are for.
+pub type MethodSets = BTreeMap<MethodName, Vec<String>>;
 
 /// What an experiment's file says, with names in place of words.
 #[derive(Clone, Debug, PartialEq)]
@@ -34,6 +38,8 @@ pub struct Experiment {
     pub episodes: Option<u64>,
     /// Settings of all runs, over those of the preset.
     pub set: Vec<String>,
+    /// Settings of the training of single methods, over those.
+    pub method_set: MethodSets,
     /// Datasets to learn from instead of own demos; `{task}` and `{seed}` stand for those of a run.
     pub dataset: Option<String>,
     /// Whether evaluations are recorded, as `rollouts/`.
@@ -58,8 +64,10 @@ pub struct Variation {
     pub name: String,
     /// The earlier variation whose settings it begins with.
     pub extends: Option<String>,
-    /// Settings, over all others.
+    /// Settings, over those of the experiment.
     pub set: Vec<String>,
+    /// Settings of the training of single methods, over all others.
+    pub method_set: MethodSets,
     /// Stages that they hold for.
     pub stages: Vec<Stage>,
     /// Names of the tasks that have it.

@@ -149,6 +149,24 @@ fn an_extended_variation_has_the_settings_of_the_one_before() {
 }
 
 #[test]
+fn settings_of_a_method_alone_leave_what_methods_share() {
+    let text = TEXT.replace("episodes = 7", "episodes = 7\nmethod_set = { bc = [\"train.warm_start_updates=70\"] }");
+    let more = "name = \"more\"\nextends = \"plain\"\nset = [\"train.bc_batch=32\"]\nmethod_set.bc = [\"train.warm_start_updates=90\"]\n";
+    let changed = grid(&format!("{text}\n[[variation]]\n{more}"));
+    let words =
+        |id: &str| changed.steps.iter().find(|step| step.id == id).unwrap_or_else(|| panic!("no step {id}")).words.join(" ");
+    let places =
+        |grid: &Grid| grid.steps.iter().map(|step| step.id.clone()).filter(|id| !id.contains("/more/")).collect::<BTreeSet<_>>();
+    assert_eq!(places(&changed), places(&grid(TEXT)));
+    assert!(words("stack/seed-3/best/plain/bc/train").contains("--set train.warm_start_updates=70 --seed"));
+    assert!(!words("stack/seed-3/best/plain/hil/train").contains("warm_start"));
+    // Over the experiment's for the method, and over the variation's own.
+    let own = "--set train.warm_start_updates=70 --set train.bc_batch=32 --set train.warm_start_updates=90 --seed";
+    assert!(words("stack/seed-3/best/more/bc/train").contains(own));
+    assert!(!words("stack/seed-3/best/more/hil/train").contains("warm_start"));
+}
+
+#[test]
 fn a_file_says_what_a_report_shows_and_names_what_is_there() {
     let with = |lines: &str| Experiment::parse(Path::new("some.toml"), &format!("{lines}\n{TEXT}"), &Overrides::default());
     assert_eq!(experiment(TEXT).report, ReportKind::Success);

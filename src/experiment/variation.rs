@@ -1,14 +1,15 @@
 //! A variation as a file has it, checked.
 
-use super::spec::{Experiment, Variation};
-use super::wording::{check_name, not_empty, parsed, task_names};
+use super::spec::{Experiment, MethodSets, Variation};
+use super::wording::{check_name, method_sets, not_empty, parsed, task_names};
 use crate::config::Stage;
 use crate::learn::MethodName;
 use crate::words::unknown;
 use serde::Deserialize;
+use std::collections::BTreeMap;
 
 /// Keys of a variation.
-pub(super) const KEYS: [&str; 6] = ["name", "extends", "set", "stages", "tasks", "methods"];
+pub(super) const KEYS: [&str; 7] = ["name", "extends", "set", "method_set", "stages", "tasks", "methods"];
 /// Files and directories, their endings aside, that stand where the name of a variation would.
 const TAKEN: [&str; 6] = ["plans", "recordings", "dataset", "dynamics", "logs", "rollouts"];
 
@@ -20,6 +21,8 @@ pub(super) struct Raw {
     extends: Option<String>,
     #[serde(default)]
     set: Vec<String>,
+    #[serde(default)]
+    method_set: BTreeMap<String, Vec<String>>,
     stages: Option<Vec<String>>,
     tasks: Option<Vec<String>>,
     methods: Option<Vec<String>>,
@@ -48,18 +51,22 @@ impl Raw {
         if let Some(foreign) = foreign.into_iter().next() {
             return Err(format!("{foreign} is none of the experiment's; add it there too"));
         }
-        let mut set = match &self.extends {
+        let (mut set, mut method_set) = match &self.extends {
             Some(name) => earlier(name, of)?,
-            None => Vec::new(),
+            None => Default::default(),
         };
         set.extend(self.set.iter().cloned());
-        Ok(Variation { name: self.name.clone(), extends: self.extends.clone(), set, stages, tasks, methods })
+        for (method, own) in method_sets(&self.method_set, &methods)? {
+            method_set.entry(method).or_default().extend(own);
+        }
+        method_set.retain(|method, _| methods.contains(method));
+        Ok(Variation { name: self.name.clone(), extends: self.extends.clone(), set, method_set, stages, tasks, methods })
     }
 }
 
 /// The settings of a variation that stands before.
-fn earlier(name: &str, of: &Experiment) -> std::result::Result<Vec<String>, String> {
-    let found = of.variations.iter().find(|v| v.name == name).map(|v| v.set.clone());
+fn earlier(name: &str, of: &Experiment) -> std::result::Result<(Vec<String>, MethodSets), String> {
+    let found = of.variations.iter().find(|v| v.name == name).map(|v| (v.set.clone(), v.method_set.clone()));
     let known: Vec<&str> = of.variations.iter().map(|v| v.name.as_str()).collect();
     found.ok_or_else(|| format!("extends: {} (only those before it)", unknown("variation", name, &known)))
 }

@@ -1,8 +1,10 @@
 //! Words of an experiment's file: names, keys and lists, and what is wrong with them.
 
+use super::spec::MethodSets;
 use crate::config::{ChosenTask, Stage};
+use crate::learn::MethodName;
 use crate::words::{did_you_mean, shown, unknown};
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// A directory's name is shorter than 256 bytes everywhere; nobody types so many.
 const LONGEST_NAME: usize = 64;
@@ -12,6 +14,26 @@ pub(super) const TAKES: &str = "a text takes all that is written to it";
 
 pub(super) fn parsed<T: std::str::FromStr<Err = String>>(words: &[String]) -> std::result::Result<Vec<T>, String> {
     words.iter().map(|word| word.parse()).collect()
+}
+
+/// Settings of single methods: each one of `allowed`, and settings of `train` alone, whose artefacts are a method's own.
+pub(super) fn method_sets(
+    words: &BTreeMap<String, Vec<String>>,
+    allowed: &[MethodName],
+) -> std::result::Result<MethodSets, String> {
+    let mut sets = MethodSets::new();
+    for (word, set) in words {
+        let method: MethodName = word.parse().map_err(|why| format!("method_set: {why}"))?;
+        if !allowed.contains(&method) {
+            return Err(format!("method_set: method {word} is not among the methods; add it there too"));
+        }
+        if let Some(other) = set.iter().find(|set| !set.trim_start().starts_with("train.")) {
+            let why = "allowed: settings of train, for what comes before is shared by methods";
+            return Err(format!("method_set: \"{}\" of {word}; {why}", shown(other)));
+        }
+        sets.insert(method, set.clone());
+    }
+    Ok(sets)
 }
 
 /// Names of tasks, each of one that there is: with hilt, or in a file.

@@ -6,7 +6,7 @@ use crate::sweep::{Sweep, TINY};
 fn a_wrong_file_is_refused_with_what_is_meant() {
     let variation = "[[variation]]\nname = \"plain\"\n";
     let again = "[[variation]]\nname = \"same\"\n\n[[variation]]\nname = \"plain\"\n";
-    let cases: [(&str, &str, &[&str]); 17] = [
+    let cases: [(&str, &str, &[&str]); 20] = [
         ("[\"hil\", \"bc\"]", "[\"hil\", \"bv\"]", &["unknown method \"bv\"; did you mean bc?"]),
         ("[\"pick-up\"]", "[\"pick_up\"]", &["unknown task \"pick_up\"; did you mean pick-up?"]),
         ("seeds =", "sedes =", &["unknown key \"sedes\"; did you mean seeds?"]),
@@ -19,6 +19,17 @@ fn a_wrong_file_is_refused_with_what_is_meant() {
         ("train.rho=0.6", "train.rho=6", &["variation \"rho-0.6\"", "train.rho"]),
         ("methods = [\"hil\"]\n", "", &["changes nothing of method bc"]),
         ("methods = [\"hil\"]\n", "methods = [\"sc\"]\n", &["method sc is none of the experiment's"]),
+        ("episodes = 2", "episodes = 2\nmethod_set = { bv = [] }", &["method_set: unknown method \"bv\"; did you mean bc?"]),
+        (
+            "episodes = 2",
+            "episodes = 2\nmethod_set = { bc = [\"train.rho=1\"] }",
+            &["\"train.rho=1\" changes nothing of method bc"],
+        ),
+        (
+            "methods = [\"hil\"]\n",
+            "methods = [\"hil\"]\nmethod_set.hil = [\"plan.episodes=3\"]\n",
+            &["method_set: \"plan.episodes=3\" of hil; allowed: settings of train"],
+        ),
         (variation, "[[variation]]\nname = \"rho-0.6\"\n", &["variations: \"rho-0.6\" is there twice"]),
         (variation, again, &["variations \"same\" and \"plain\" come to the same settings of pick-up, hil"]),
         (variation, "[[variation]]\nname = \"../up\"\n", &["\"../up\" is no name of a directory"]),

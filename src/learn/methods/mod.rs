@@ -28,7 +28,7 @@ use crate::words::{did_you_mean, shown};
 use std::str::FromStr;
 
 /// The methods by name.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum MethodName {
     /// Algorithm 1: both losses, mixed by alpha as the settings say.
     Hil,

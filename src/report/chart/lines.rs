@@ -75,8 +75,6 @@ const BETWEEN: f64 = 82.0;
 const UNDER: f64 = 38.0;
 /// Right of each panel, for the next one's numbers, beside the names at the ends of its lines.
 pub(super) const GAP: f64 = 62.0;
-/// Series stand this far apart at the same category, so that their intervals can be told apart; more would make lines cross that do not.
-const DODGE: f64 = 4.0;
 /// Single observations stand this far right of their value.
 const SINGLES_RIGHT: f64 = 5.0;
 /// Markers of a dense line.
@@ -148,11 +146,7 @@ impl Chart {
             svg += &text(x(*value), bottom + 18.0, "middle", "chart-small", name);
         }
         svg += &text(left + PLOT_WIDTH / 2.0, bottom + 38.0, "middle", "", &self.x_label);
-        let dodge = if matches!(self.x, Axis::Categories(_)) { DODGE } else { 0.0 };
-        for (i, series) in panel.series.iter().enumerate() {
-            let shift = dodge * (i as f64 - (panel.series.len() as f64 - 1.0) / 2.0);
-            svg += &line(series, scale, |value| x(value) + shift, y);
-        }
+        svg += &panel.series.iter().map(|series| line(series, scale, x, y)).collect::<String>();
         if panel.series.len() > 1 {
             let last = |series: &Series| series.points.iter().rev().find(|p| p.value.is_finite()).map(|p| y(p.value));
             let names = panel.series.iter().filter_map(|series| last(series).map(|y| (y, series.name.as_str())));

@@ -21,7 +21,7 @@ fn chart() -> Chart {
         x_label: "demos".into(),
         y_label: "success".into(),
         note: String::new(),
-        x: Axis::Categories(["25", "50", "100"].map(String::from).to_vec()),
+        x: Axis::Linear,
         percent: true,
         panels: vec![panel("one", 0.87), panel("two", 0.1)],
     }
@@ -36,7 +36,7 @@ fn the_picture_parses_and_has_one_marker_for_each_datum() {
     assert_eq!((points.len(), count("mean"), count("interval"), count("key")), (10, 10, 10, 2));
     assert_eq!(count("single"), points.iter().map(|p| p.singles.len()).sum::<usize>());
     let words: Vec<&str> = document.descendants().filter_map(|n| n.text()).collect();
-    for word in ["a & b", "c<d", "\"success\" > 0", "two panels", "demos", "25", "100", "80 %", "100 %", "0 %"] {
+    for word in ["a & b", "c<d", "\"success\" > 0", "two panels", "demos", "0.5", "2", "80 %", "100 %", "0 %"] {
         assert!(words.contains(&word), "{word} is not written in {words:?}");
     }
 }

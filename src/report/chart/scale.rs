@@ -5,8 +5,6 @@ use crate::math;
 /// What the horizontal axis counts.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Axis {
-    /// Names; a value is the index of one.
-    Categories(Vec<String>),
     /// Numbers from 0.
     Linear,
     /// Positive numbers, each decade as wide as the next.
@@ -34,10 +32,6 @@ impl Scale {
     /// Over all values that are finite (and above 0 on a logarithmic axis).
     pub(super) fn over(axis: &Axis, values: impl Iterator<Item = f64>) -> Self {
         match axis {
-            Axis::Categories(names) => {
-                let ticks = names.iter().enumerate().map(|(i, name)| (i as f64, name.clone())).collect();
-                Scale { low: -0.5, high: names.len().max(1) as f64 - 0.5, log: false, ticks }
-            }
             Axis::Linear => Scale::linear(values.filter(|v| v.is_finite()).fold(0.0, f64::max)),
             Axis::Log => {
                 let within = |ends: [f64; 2], v: f64| [ends[0].min(v), ends[1].max(v)];
@@ -168,8 +162,8 @@ mod tests {
     fn places_grow_with_values_from_end_to_end() {
         let log = Scale::over(&Axis::Log, [1.0, 100.0].into_iter());
         assert!((log.share(10.0) - 0.5).abs() < 1e-12 && log.share(1.0) > 0.0 && log.share(100.0) < 1.0);
-        let names = Scale::over(&Axis::Categories(vec!["a".into(), "b".into()]), std::iter::empty());
-        assert_eq!([names.share(0.0), names.share(1.0)], [0.25, 0.75]);
-        assert!(!log.holds(0.0) && names.holds(0.0));
+        let linear = Scale::over(&Axis::Linear, [4.0].into_iter());
+        assert_eq!([linear.share(0.0), linear.share(1.0)], [0.0, 0.25]);
+        assert!(!log.holds(0.0) && linear.holds(0.0));
     }
 }
