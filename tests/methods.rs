@@ -49,7 +49,7 @@ impl Huber {
 
 /// The loss over transitions `rows`, and its gradient with respect to the mean actions there.
 fn huber(samples: PolicySamples, rows: &[usize], acted: &mut Acted, loss: &mut PolicyLoss) -> Result<f64> {
-    acted.forward(samples, rows);
+    acted.forward(samples, rows, None);
     loss.begin(rows.len());
     let (mut left, scale) = (rows, 1.0 / (rows.len() * samples.corpus.layout.action_dim()) as f32);
     for (shard, d_mean) in acted.shards().iter().zip(&mut loss.d_mean) {

@@ -116,6 +116,8 @@ pub(super) const RANGES: &[Range] = &[
     within("train.alpha", 0.0, 1.0),
     within("train.alpha_max", 0.0, 1.0),
     within("train.rho", 0.0, 1.0),
+    within("train.randomise.fingers_rad", 0.0, 1.0),
+    within("train.randomise.objects_rad", 0.0, 1.0),
     within("train.sc.knee", 0.0, SINGLE),
     within("train.sc.noise_variance", 0.0, 1.0),
     within("train.sc.pulses.probability", 0.0, 1.0),

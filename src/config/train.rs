@@ -4,6 +4,7 @@ use super::bc_rl::BcRlSettings;
 use super::choices::{ActionChoice, Alpha, Convergence, FeatureSet, Objective, Updates};
 use super::limits::{network, within_ranges};
 use super::ppo::PpoSettings;
+use super::randomise::RandomiseSettings;
 use super::sc::ScSettings;
 use crate::error::{Error, Result};
 use crate::nn::Activation;
@@ -46,6 +47,8 @@ pub struct TrainSettings {
     pub alpha_average: bool,
     /// rho: state recovery probability of Algorithm 3.
     pub rho: f64,
+    /// What the policy sees of the demos.
+    pub randomise: RandomiseSettings,
     /// L_SC.
     pub sc: ScSettings,
     /// Whether the dynamics network keeps learning from observed transitions (Eq. 6) during training.
@@ -102,6 +105,7 @@ impl Default for TrainSettings {
             alpha_max: 0.8,
             alpha_average: true,
             rho: 0.3,
+            randomise: RandomiseSettings::default(),
             sc: ScSettings::default(),
             fine_tune_dynamics: true,
             dynamics_learning_rate: 1e-4,

@@ -20,6 +20,7 @@ const OF_REWARDS: &[&str] = &["train.ppo.", "train.bc_rl."];
 const OF_DEMOS: &[&str] = &[
     "plan.",
     "convert.",
+    "train.randomise.",
     "train.loss",
     "train.action",
     "train.initial_std",

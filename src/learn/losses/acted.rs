@@ -1,6 +1,7 @@
 //! pi_theta in the states of the demos: the forward pass that behavior cloning and state cloning begin with, and the backward pass that
 //! both end with.
 
+use super::offsets::Offsets;
 use super::policy_loss::Mixture;
 use super::shards;
 use crate::learn::models::{Policy, PolicySamples, Samples};
@@ -39,8 +40,8 @@ impl Acted {
         Acted { shards, active: 0, mean: Vec::with_capacity(most_rows * dim) }
     }
 
-    /// pi_theta(s) of `rows`, transitions of the samples.
-    pub fn forward(&mut self, samples: PolicySamples, rows: &[usize]) {
+    /// pi_theta(s) of `rows`, transitions of the samples, where what it sees is off by the last draw of `offsets`.
+    pub fn forward(&mut self, samples: PolicySamples, rows: &[usize], offsets: Option<&Offsets>) {
         let policy = samples.policy;
         self.active = shards::count(rows.len());
         self.shards.resize_with(self.active.max(self.shards.len()), Shard::default);
@@ -50,7 +51,8 @@ impl Acted {
             let panels = panels_of(part.len());
             shard.rows = part.len();
             shard.pass.reserve(&policy.net, panels);
-            samples.write_inputs(&rows[part], &mut shard.pass.input);
+            samples.write_inputs(&rows[part.clone()], &mut shard.pass.input);
+            offsets.inspect(|offsets| offsets.add(part, &mut shard.pass.input));
             policy.net.forward(&mut shard.pass, 0..panels);
             shard.mean.clear();
             shard.mean.resize(shard.rows * policy.action_scaling().width(), 0.0);

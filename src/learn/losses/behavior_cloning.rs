@@ -182,7 +182,7 @@ pub fn validate(batch: Batch, choices: &Choices, rng: &mut impl Rng) -> (f64, Ve
     let (mut l_bc, mut mean) = (0.0, Vec::with_capacity(batch.rows.len() * dim));
     for rows in batch.rows.chunks(VALIDATION_ROWS) {
         let share = rows.len() as f64 / batch.rows.len() as f64;
-        acted.forward(batch.samples, rows);
+        acted.forward(batch.samples, rows, None);
         let part = Batch { rows, demos: share * batch.demos, ..batch };
         l_bc += share * behavior_cloning(&acted, part, choices, rng, &mut work).0.value;
         mean.extend_from_slice(acted.mean());

@@ -3,6 +3,7 @@
 mod acted;
 pub mod behavior_cloning;
 pub mod model_loss;
+mod offsets;
 mod policy_loss;
 mod regression;
 pub(in crate::learn) mod shards;
@@ -11,5 +12,6 @@ pub mod state_cloning;
 pub use acted::Acted;
 pub use behavior_cloning::behavior_cloning;
 pub use model_loss::ModelLearner;
+pub use offsets::Offsets;
 pub use policy_loss::{Mixture, PolicyLoss};
 pub use state_cloning::state_cloning;

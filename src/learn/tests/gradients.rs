@@ -47,7 +47,7 @@ impl World {
 
     fn acted(&self) -> Acted {
         let mut acted = Acted::new(&self.policy, self.rows.len());
-        acted.forward(self.samples(), &self.rows);
+        acted.forward(self.samples(), &self.rows, None);
         acted
     }
 

@@ -1,7 +1,7 @@
 //! Training that stops and goes on, and the choice of a model, on toy demos.
 
 use super::testing::{Toy, demos};
-use crate::config::{Alpha, PretrainSettings, ScSettings, TrainSettings};
+use crate::config::{Alpha, PretrainSettings, RandomiseSettings, ScSettings, TrainSettings};
 use crate::error::{Error, Result};
 use crate::interrupt::Interrupt;
 use crate::learn::{Checkpoint, Dynamics, Hooks, Inputs, MethodName as Method, Policy, Trained, pretrain_dynamics, train};
@@ -65,6 +65,7 @@ fn from_every_epoch_on_training_ends_with_the_same_bits() {
         (Method::Hil, quick()),
         (Method::Hil, TrainSettings { select_episodes: 5, sc: ScSettings { balance: true, ..Default::default() }, ..quick() }),
         (Method::Bc, TrainSettings { select_episodes: 5, ..quick() }),
+        (Method::Hil, TrainSettings { randomise: RandomiseSettings { fingers_rad: 0.1, objects_rad: 0.1 }, ..quick() }),
         (Method::Sc, TrainSettings { clip_norm: 0.0, ..quick() }),
         (Method::Hil, TrainSettings { warm_start_updates: 0.into(), alpha: Alpha::Fixed(0.5), ..quick() }),
     ] {

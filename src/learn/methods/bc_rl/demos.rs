@@ -46,7 +46,7 @@ impl Demos {
         to: &mut [f32],
     ) -> Result<f64> {
         let (samples, rows) = (PolicySamples { corpus, policy }, Batches::new(corpus, self.batch).draw(rng));
-        self.acted.forward(samples, &rows);
+        self.acted.forward(samples, &rows, None);
         let batch = Batch { samples, rows: &rows, demos: rows.len() as f64 / corpus.mean_length() };
         let (l_bc, _) = behavior_cloning(&self.acted, batch, &self.choices, rng, &mut self.work);
         if !l_bc.value.is_finite() {

@@ -17,7 +17,7 @@ use crate::interrupt::Interrupt;
 use crate::learn::limits::{affordable, before_the_first_update};
 use crate::learn::losses::behavior_cloning::{self as bc, draw_noise};
 use crate::learn::losses::state_cloning::{self as sc, Pushes, Segment, draw_segments};
-use crate::learn::losses::{Acted, behavior_cloning, state_cloning};
+use crate::learn::losses::{Acted, Offsets, behavior_cloning, state_cloning};
 use crate::learn::models::{Corpus, Dynamics, Policy, PolicySamples};
 use crate::learn::run::{EpochMetrics, Mean, Stage};
 use crate::nn::cosine;
@@ -29,6 +29,8 @@ use rand::seq::SliceRandom;
 pub const WARM_START: &str = "warm-start";
 /// Algorithm 1.
 pub const HIL: &str = "hil";
+/// The random stream of `[train.randomise]`.
+const OFFSETS: &str = "train.randomise";
 
 /// HIL, its two parts, and any fixed mixture of them.
 pub struct Hil {
@@ -49,6 +51,7 @@ pub struct Hil {
 struct Work {
     rows: Vec<usize>,
     acted: Acted,
+    offsets: Offsets,
     bc_choices: bc::Choices,
     bc: bc::Workspace,
     sc_choices: sc::Choices,
@@ -95,6 +98,7 @@ impl Hil {
         let work = Work {
             rows: Vec::with_capacity(most_rows),
             acted: Acted::new(&policy, most_rows),
+            offsets: Offsets::new(&settings.randomise, policy.features()),
             bc_choices: bc::Choices::new(&settings),
             bc: bc::Workspace::new(dim, most_rows),
             sc_choices: sc::Choices::new(&settings, corpus),
@@ -150,10 +154,11 @@ impl Hil {
         self.draws += 1;
         let finite = self.judge();
         let (corpus, descent, mixing) = (&self.inputs.train, &mut self.descent, &mut self.mixing);
-        let Work { rows, acted, bc_choices, bc, sc_choices, sc, segments, noise, pushes } = &mut self.work;
+        let Work { rows, acted, offsets, bc_choices, bc, sc_choices, sc, segments, noise, pushes } = &mut self.work;
         corpus.rows_of(demos, rows);
         let samples = PolicySamples { corpus, policy: &descent.policy };
-        acted.forward(samples, rows); // pi_theta in the demos' states, where both losses begin
+        let offsets = offsets.draw(rows.len(), &mut stream(self.seed, OFFSETS, self.draws));
+        acted.forward(samples, rows, Some(offsets)); // pi_theta in the demos' states, where both losses begin
 
         // Algorithm 2, Eq. 3-4
         let mut rng = stream(self.seed, "train.bc", self.draws);

@@ -1,6 +1,6 @@
 //! Behavior cloning alone: before Algorithm 1, and as the method `bc`.
 
-use super::{BC_REMEDY, Hil, Update, WARM_START, Work};
+use super::{BC_REMEDY, Hil, OFFSETS, Update, WARM_START, Work};
 use crate::error::Result;
 use crate::interrupt::Interrupt;
 use crate::learn::losses::behavior_cloning;
@@ -39,9 +39,11 @@ impl Hil {
     pub fn clone_behavior(&mut self, rows: &[usize], learning_rate: f64) -> Result<Update> {
         self.draws += 1;
         let finite = self.judge();
-        let (corpus, descent, Work { acted, bc_choices, bc, .. }) = (&self.inputs.train, &mut self.descent, &mut self.work);
+        let (corpus, descent, Work { acted, offsets, bc_choices, bc, .. }) =
+            (&self.inputs.train, &mut self.descent, &mut self.work);
         let samples = PolicySamples { corpus, policy: &descent.policy };
-        acted.forward(samples, rows);
+        let offsets = offsets.draw(rows.len(), &mut stream(self.seed, OFFSETS, self.draws));
+        acted.forward(samples, rows, Some(offsets));
         let batch = Batch { samples, rows, demos: rows.len() as f64 / corpus.mean_length() };
         let mut rng = stream(self.seed, "train.bc", self.draws);
         let (l_bc, d_conv) = behavior_cloning(acted, batch, bc_choices, &mut rng, bc);
