@@ -135,16 +135,7 @@ pub(super) fn world(settings: &Value) -> Value {
 
 /// In what the episodes differ from those that the policy was trained for.
 fn of_scene(trained: &Value, here: &Value) -> Vec<Difference> {
-    let all = WORLD.iter().flat_map(|section| differences(section, &trained[*section], &here[*section]));
-    all.filter(|difference| !is_younger(difference)).collect()
-}
-
-/// Keys that older versions did not have, and the values that stand for how they acted.
-const YOUNGER: [(&str, f64); 2] = [("scene.finger_friction", 1.0), ("simulate.delay_steps", 0.0)];
-
-/// Whether a version without the key trained the policy, in a world as it is here.
-fn is_younger(Difference { key, theirs, ours }: &Difference) -> bool {
-    YOUNGER.iter().any(|(younger, value)| key == younger && theirs == "missing" && ours.as_f64() == Some(*value))
+    WORLD.iter().flat_map(|section| differences(section, &trained[*section], &here[*section])).collect()
 }
 
 fn say_of_scene(foreign: &[Difference], console: &Console) {

@@ -7,6 +7,14 @@ use std::fmt;
 /// Parts of a provenance, in the order in which two are compared.
 const PARTS: [&str; 7] = ["hilt_version", "schema_version", "stage", "task", "seed", "settings", "inputs"];
 
+/// Settings that older versions did not have, and the values that stand for how they acted: where one side lacks such a key, that value is no difference.
+const YOUNGER: [(&str, f64); 4] = [
+    ("scene.finger_friction", 1.0),
+    ("simulate.delay_steps", 0.0),
+    ("train.randomise.fingers_rad", 0.0),
+    ("train.randomise.objects_rad", 0.0),
+];
+
 /// A dotted key and its two values.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Difference {
@@ -44,8 +52,17 @@ pub fn differences(root: &str, theirs: &Value, ours: &Value) -> Vec<Difference> 
     let (theirs, ours) = (fields(theirs), fields(ours));
     let missing = |map: &Map<String, Value>, key: &str| map.get(key).cloned().unwrap_or_else(|| "missing".into());
     let new = ours.keys().filter(|key| !theirs.contains_key(*key));
-    let keys = theirs.keys().chain(new).filter(|key| theirs.get(*key) != ours.get(*key));
+    let differs = |key: &String| match (theirs.get(key), ours.get(key)) {
+        (Some(value), None) | (None, Some(value)) => !is_as_before(key, value),
+        (theirs, ours) => theirs != ours,
+    };
+    let keys = theirs.keys().chain(new).filter(|key| differs(key));
     keys.map(|key| Difference { key: key.clone(), theirs: missing(&theirs, key), ours: missing(&ours, key) }).collect()
+}
+
+/// Whether a version without the key acted as this value says.
+fn is_as_before(key: &str, value: &Value) -> bool {
+    YOUNGER.iter().any(|(younger, as_before)| key == *younger && value.as_f64() == Some(*as_before))
 }
 
 /// All values of a settings object by their dotted keys, in order.
@@ -69,6 +86,8 @@ fn flatten(name: &str, value: &Value, out: &mut Vec<(String, Value)>) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::config::{Pipeline, Preset, Source, Stage};
+    use crate::task::built_in::stack;
     use serde_json::json;
 
     #[test]
@@ -86,5 +105,27 @@ mod tests {
         assert_eq!(difference(|p| p.settings["method"] = "bc".into()), found("method", "\"hil\"", "\"bc\""));
         let with_input = |p: &mut Provenance| drop(p.inputs.insert("dataset".into(), "ab".into()));
         assert_eq!(difference(with_input), found("inputs.dataset", "\"missing\"", "\"ab\""));
+    }
+    #[test]
+    fn a_key_that_an_older_version_lacked_is_no_difference_as_long_as_it_says_how_that_acted() {
+        let defaults = Pipeline::load(&Source::BuiltIn(stack().into(), Preset::Best), &[]).expect("settings");
+        for (key, as_before) in YOUNGER {
+            let section = key.split('.').next().expect("a section");
+            let stage = Stage::ALL.into_iter().find(|stage| stage.sections().contains(&section)).expect("a stage reads it");
+            let ours = Provenance::new(stage.name(), "stack", defaults.to_json(stage).expect("JSON"), 1);
+            let path = format!("/{}", key.replace('.', "/"));
+            let (table, name) = path.rsplit_once('/').expect("a path");
+            assert_eq!(
+                ours.settings.pointer(&path).and_then(Value::as_f64),
+                Some(as_before),
+                "{key}: preset best acts as before"
+            );
+            let (mut older, mut other) = (ours.clone(), ours.clone());
+            older.settings.pointer_mut(table).and_then(Value::as_object_mut).expect("a table").remove(name);
+            *other.settings.pointer_mut(&path).expect("the value") = json!(0.125);
+            assert_eq!((first_difference(&older, &ours), first_difference(&ours, &older)), (None, None), "{key}");
+            let said = first_difference(&older, &other).map(|found| found.to_string());
+            assert_eq!(said, Some(format!("{key} was \"missing\", now it is 0.125")));
+        }
     }
 }
