@@ -106,6 +106,7 @@ mod tests {
         let with_input = |p: &mut Provenance| drop(p.inputs.insert("dataset".into(), "ab".into()));
         assert_eq!(difference(with_input), found("inputs.dataset", "\"missing\"", "\"ab\""));
     }
+
     #[test]
     fn a_key_that_an_older_version_lacked_is_no_difference_as_long_as_it_says_how_that_acted() {
         let defaults = Pipeline::load(&Source::BuiltIn(stack().into(), Preset::Best), &[]).expect("settings");

@@ -1,6 +1,7 @@
 //! How far what the policy sees while it learns from demos is off (`[train.randomise]`).
 
 use crate::config::RandomiseSettings;
+use crate::error::{Error, Result};
 use crate::layout::{POINT_DIM, POSE_DIM};
 use crate::learn::models::Features;
 use crate::nn::Panels;
@@ -18,17 +19,28 @@ pub struct Offsets {
 
 impl Offsets {
     /// For a policy with these features, none drawn yet.
-    pub fn new(settings: &RandomiseSettings, features: &Features) -> Self {
+    ///
+    /// # Errors
+    /// [`Error::Usage`] when there is nothing of what is to be off.
+    pub fn new(settings: &RandomiseSettings, features: &Features) -> Result<Self> {
         let layout = features.layout();
-        let fingers = layout.fingers().map(|joint| layout.positions().start + joint);
-        let fingers = fingers.map(|i| (i, settings.fingers_rad as f32 * layout.state_unit(i).unwrap_or(1.0)));
+        let fingers = layout.fingers().map(|joint| layout.positions().start + joint).collect::<Vec<_>>();
+        let turns = layout.objects().flat_map(|(_, at)| at + POINT_DIM..at + POSE_DIM).collect::<Vec<_>>();
+        for (key, value, entries) in
+            [("fingers_rad", settings.fingers_rad, &fingers), ("objects_rad", settings.objects_rad, &turns)]
+        {
+            if value > 0.0 && entries.is_empty() {
+                let what = format!("train.randomise.{key} is {value}, but what the demos hold names none");
+                return Err(Error::Usage(format!("{what}: set it to 0, or learn from demos of hilt's own layout")));
+            }
+        }
+        let rad = |i: &usize| (*i, settings.fingers_rad as f32 * layout.state_unit(*i).unwrap_or(1.0));
         // A small turn moves a unit quaternion by half its angle; what it adds along the quaternion itself is of no account.
-        let turned = layout.objects().flat_map(|(_, at)| at + POINT_DIM..at + POSE_DIM);
-        let turned = turned.map(|i| (i, settings.objects_rad as f32 / 2.0));
+        let turned = |i: &usize| (*i, settings.objects_rad as f32 / 2.0);
+        let all = fingers.iter().map(rad).chain(turns.iter().map(turned)).filter(|(_, std)| *std > 0.0);
         let place = |entry: usize| features.kept().iter().position(|kept| *kept == entry);
         let unit = |entry: usize| features.state_scaling().std[entry];
-        let all = fingers.chain(turned).filter(|(_, std)| *std > 0.0);
-        Offsets { inputs: all.filter_map(|(i, std)| Some((place(i)?, std / unit(i)))).collect(), drawn: Vec::new() }
+        Ok(Offsets { inputs: all.filter_map(|(i, std)| Some((place(i)?, std / unit(i)))).collect(), drawn: Vec::new() })
     }
 
     /// Draws those of `rows` states.
@@ -57,7 +69,8 @@ impl Offsets {
 mod tests {
     use super::*;
     use crate::config::FeatureSet;
-    use crate::learn::models::Corpus;
+    use crate::layout::Layout;
+    use crate::learn::models::{Corpus, Scaling};
     use crate::learn::tests::testing::{Toy, demo};
     use crate::seed::stream;
 
@@ -66,7 +79,7 @@ mod tests {
         let corpus = Corpus::new(&[demo(Toy::Stack, 400, 1)], "training").expect("a demo");
         let features = Features::fit(&corpus, FeatureSet::FkNear, true);
         let settings = RandomiseSettings { fingers_rad: 0.1, objects_rad: 0.06 };
-        let mut offsets = Offsets::new(&settings, &features);
+        let mut offsets = Offsets::new(&settings, &features).expect("fingers and a block");
         let rows: Vec<usize> = (0..corpus.rows()).collect();
         let inputs = |offsets: Option<&Offsets>| {
             let mut panels = Panels::default();
@@ -97,8 +110,18 @@ mod tests {
     fn nothing_is_drawn_where_nothing_is_off() {
         let corpus = Corpus::new(&[demo(Toy::Stack, 20, 1)], "training").expect("a demo");
         let features = Features::fit(&corpus, FeatureSet::Raw, false);
-        let (mut offsets, mut rng) = (Offsets::new(&RandomiseSettings::default(), &features), stream(0, "test", 0));
+        let (mut offsets, mut rng) =
+            (Offsets::new(&RandomiseSettings::default(), &features).expect("nothing"), stream(0, "test", 0));
         offsets.draw(20, &mut rng);
         assert_eq!(rng, stream(0, "test", 0));
+    }
+
+    #[test]
+    fn what_the_demos_do_not_have_cannot_be_off() {
+        let layout = Layout { state: vec![], action: vec![], aims: vec![], arm: None, ..(*Toy::Stack.layout()).clone() };
+        let features = Features::from_scaling(&layout.into(), FeatureSet::Raw, false, Scaling::default(), Scaling::default());
+        let settings = RandomiseSettings { fingers_rad: 0.1, objects_rad: 0.0 };
+        let said = Offsets::new(&settings, &features).err().expect("refused").to_string();
+        assert!(said.contains("train.randomise.fingers_rad is 0.1, but what the demos hold names none: set it to 0"), "{said}");
     }
 }

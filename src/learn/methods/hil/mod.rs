@@ -98,7 +98,7 @@ impl Hil {
         let work = Work {
             rows: Vec::with_capacity(most_rows),
             acted: Acted::new(&policy, most_rows),
-            offsets: Offsets::new(&settings.randomise, policy.features()),
+            offsets: Offsets::new(&settings.randomise, policy.features())?,
             bc_choices: bc::Choices::new(&settings),
             bc: bc::Workspace::new(dim, most_rows),
             sc_choices: sc::Choices::new(&settings, corpus),
