@@ -14,14 +14,16 @@
 //! | Algorithm 1: HIL; Eq. 1: L_mix | [`learn::methods::hil`] | BC and SC mixed by alpha, after a warm start; pure BC and SC are the same loop |
 //! | alpha, its average and cap | [`learn::methods::mixing`] | alpha_e = d_conv, and the balance of the two gradients |
 //! | Eq. 2: the update of theta | [`learn::methods::descent`] | Adam on the gradient of L_mix |
-//! | Algorithm 2: BC; Eq. 3: L_BC; Eq. 4: p_t, d_conv | [`mod@learn::losses::behavior_cloning`] | loss on the demos' states, degree of policy convergence |
+//! | Algorithm 2: BC; Eq. 3: L_BC | [`mod@learn::losses::behavior_cloning`] | loss on the demos' states |
+//! | Eq. 4: p_t, d_conv | [`learn::losses::convergence`] | degree of policy convergence |
 //! | Algorithm 3: SC; Eq. 5: L_SC; rho | [`mod@learn::losses::state_cloning`] | rollouts in f_phi, stochastic recovery, gradient through time |
-//! | Algorithm 4 | [`mod@learn::methods::pretrain_dynamics`] | pretraining of f_phi; [`learn::methods::fine_tuning`] goes on with it |
+//! | Algorithm 4 | [`sim::reexecute`], [`mod@learn::methods::pretrain_dynamics`] | demos executed again, pretraining of f_phi; [`learn::methods::fine_tuning`] goes on with it |
 //! | Eq. 6: L_model | [`learn::losses::model_loss`] | loss of f_phi on observed transitions |
 //! | BC + RL, which the paper compares with | [`learn::methods::bc_rl`] | BC, then L_RL + lambda L_BC |
 //! | PPO, which the paper compares with | [`learn::methods::ppo`] | learns in the simulator from rewards alone |
 //! | N(0, .001) on actions | [`sim`] | noise while demos are recorded and policies evaluated |
 //! | tasks, milestones, success | [`task`], [`tasks`] | a task as its file says it; what follows from it, one file a kind of goal |
+//! | staged reward | [`tasks::Monitor`] | each milestone once; [`tasks::dense`] is another, in every step |
 //! | success rates | [`eval`] | seeded rollouts, Wilson intervals, failures by class |
 //! | rho, alpha, tau, ... | [`config`] | every choice is a key; `pipelines/paper` sets them as literally as can work |
 //!

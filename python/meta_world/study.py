@@ -43,7 +43,7 @@ SLACK, LEAST_STEPS, MOST_STEPS = 2, 150, 500
 
 # What HIL learns with; the others get the same processor time. An update of behavior cloning is the unit.
 BATCH = 512  # rows of it
-WARM_START, HIL_UPDATES, DEMOS_PER_UPDATE = 1000, 300, 8
+WARM_START, HIL_UPDATES, DEMOS_PER_UPDATE = 4000, 300, 8
 PRETRAINING, PRETRAINING_BATCH = 1500, 256
 # Measured on one core, over 1 to 25 demonstrations: an update of HIL costs 4 updates of behavior cloning a row, one of pretraining half of one.
 HIL_ROW_COST, PRETRAINING_COST = 4.0, 0.5

@@ -91,16 +91,16 @@ impl SettingsArgs {
     /// Also what reading the artefact returns.
     pub fn resolve_from(&self, artefact: Option<(&Path, Kind)>, flags: &[Flag]) -> Result<Pipeline> {
         let project = self.project()?;
-        let said = project.as_ref();
-        let file = self.pipeline_file(said);
+        let project = project.as_ref();
+        let file = self.pipeline_file(project);
         let unsaid = self.task.is_none() && file.is_none();
-        let own_task = said.and_then(|project| project.task.clone());
+        let own_task = project.and_then(|project| project.task.clone());
         let read = |(path, kind)| MadeFor::read(path, kind, own_task.as_deref());
         let made_for = artefact.filter(|_| unsaid).map(read).transpose()?;
         let made = made_for.as_ref();
         let task = self.task.clone().or_else(|| made.map(|made| made.task.clone())).or(own_task);
-        let robot = self.robot.clone().or_else(|| made?.robot.clone()).or_else(|| said?.robot.clone());
-        let preset = self.preset.or_else(|| said?.preset);
+        let robot = self.robot.clone().or_else(|| made?.robot.clone()).or_else(|| project?.robot.clone());
+        let preset = self.preset.or_else(|| project?.preset);
         let source = match (file, task.as_deref()) {
             (Some(path), said) => Source::File(path, said.map(task_said).transpose()?),
             // A task's file is a pipeline file.
@@ -112,7 +112,7 @@ impl SettingsArgs {
             }
         };
         let (sets, given) = self.overrides([&("robot", robot)].into_iter().chain(flags));
-        let pipeline = Pipeline::load_with(&source, said, &sets).map_err(|e| in_words_of_flags(e, &given))?;
+        let pipeline = Pipeline::load_with(&source, project, &sets).map_err(|e| in_words_of_flags(e, &given))?;
         check_ready_pose(&pipeline.robot, &pipeline.scene)?;
         Ok(pipeline)
     }

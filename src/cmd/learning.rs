@@ -37,7 +37,12 @@ enum Subject {
     /// Demos of a task of hilt.
     Task(Box<Pipeline>),
     /// A dataset of another program.
-    Dataset(Box<(LearningSettings, Source)>),
+    Dataset(Box<ForeignDataset>),
+}
+
+struct ForeignDataset {
+    settings: LearningSettings,
+    source: Source,
 }
 
 /// What is learned from, and on what it is judged.
@@ -55,9 +60,12 @@ impl Learning {
     /// As [`SettingsArgs::resolve`]; [`Error::Usage`] for flags that do not go together; what is wrong with a dataset of another program.
     pub fn of(settings: &SettingsArgs, columns: &ColumnArgs, dataset: Option<&Path>, flags: &[Flag]) -> Result<Self> {
         if let Some(dir) = dataset.filter(|dir| foreign::is_foreign(dir)) {
-            let learning = settings.resolve_for_dataset(dir, flags)?;
+            let settings = settings.resolve_for_dataset(dir, flags)?;
             let source = foreign::open(dir, &Choice { state: columns.state.clone(), action: columns.action.clone() })?;
-            return Ok(Learning { subject: Subject::Dataset(Box::new((learning, source))), dataset: dir.into() });
+            return Ok(Learning {
+                subject: Subject::Dataset(Box::new(ForeignDataset { settings, source })),
+                dataset: dir.into(),
+            });
         }
         if !columns.state.is_empty() || columns.action.is_some() {
             let message =
@@ -88,18 +96,18 @@ impl Learning {
     }
 
     /// Settings of the dynamics network.
-    pub fn pretrain(&self) -> &PretrainSettings {
+    pub fn pretrain_settings(&self) -> &PretrainSettings {
         match &self.subject {
             Subject::Task(pipeline) => &pipeline.pretrain,
-            Subject::Dataset(of) => &of.0.pretrain,
+            Subject::Dataset(foreign) => &foreign.settings.pretrain,
         }
     }
 
     /// Settings of the policy.
-    pub fn train(&self) -> &TrainSettings {
+    pub fn train_settings(&self) -> &TrainSettings {
         match &self.subject {
             Subject::Task(pipeline) => &pipeline.train,
-            Subject::Dataset(of) => &of.0.train,
+            Subject::Dataset(foreign) => &foreign.settings.train,
         }
     }
 
@@ -107,7 +115,9 @@ impl Learning {
     pub fn path_or(&self, given: Option<&Path>, name: &str) -> PathBuf {
         match &self.subject {
             Subject::Task(pipeline) => path_or(given, pipeline, name),
-            Subject::Dataset(of) => given.map_or_else(|| Path::new(RUNS).join(&of.1.layout.name).join(name), Path::to_path_buf),
+            Subject::Dataset(foreign) => {
+                given.map_or_else(|| Path::new(RUNS).join(&foreign.source.layout.name).join(name), Path::to_path_buf)
+            }
         }
     }
 
@@ -118,7 +128,7 @@ impl Learning {
     pub fn provenance(&self, args: &SettingsArgs, stage: Stage, inputs: &[(&str, ContentHash)]) -> Result<Provenance> {
         let (settings, source) = match &self.subject {
             Subject::Task(pipeline) => return args.provenance(stage, pipeline, inputs),
-            Subject::Dataset(of) => (&of.0, &of.1),
+            Subject::Dataset(foreign) => (&foreign.settings, &foreign.source),
         };
         let mut all = settings.to_json(stage)?;
         let names = |spans: &[Span]| spans.iter().map(|span| span.name.clone()).collect::<Vec<_>>();
@@ -138,9 +148,9 @@ impl Learning {
             Subject::Task(pipeline) => {
                 (own_demos(dir, pipeline)?, "run hilt convert again, over recordings of which none is there twice")
             }
-            Subject::Dataset(of) => {
-                let demos = foreign_demos(&of.0, &of.1, args.seed, console)?;
-                of.0 = of.0.clone().sized(demos.train.iter().map(Demo::len).sum());
+            Subject::Dataset(foreign) => {
+                let demos = foreign_demos(&foreign.settings, &foreign.source, args.seed, console)?;
+                foreign.settings = foreign.settings.clone().sized(demos.train.iter().map(Demo::len).sum());
                 (demos, "drop one (hilt dataset drop --episodes)")
             }
         };
@@ -164,7 +174,7 @@ impl Learning {
                     read_network(path, weights::DYNAMICS, pipeline, Dynamics::from_tensors, |dynamics| dynamics.layout())?;
                 return Ok((dynamics, content));
             }
-            Subject::Dataset(of) => &of.1,
+            Subject::Dataset(foreign) => &foreign.source,
         };
         let (tensors, description, made, content) = weights::read_hashed(path, weights::DYNAMICS)?;
         let dynamics = Dynamics::from_tensors(&tensors, &description).map_err(|why| Error::input(path, why))?;

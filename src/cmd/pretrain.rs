@@ -60,7 +60,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome> {
         epochs.step(epoch, metrics);
         live.step(epoch, metrics);
     };
-    let settings = learning.pretrain();
+    let settings = learning.pretrain_settings();
     let (dynamics, report) = pretrain_dynamics(train, validation, settings, seed, &mut log, &context.interrupt)?;
     epochs.finish();
     context.console.say(output::table_text(&report.errors).trim_end());

@@ -97,7 +97,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome> {
     let resume = if args.resume { checkpoint::read(&kept, &provenance)? } else { None };
     announce(console, args.resume, resume.as_ref(), &kept);
     let mut keeper = Keeper::new(&kept, &provenance, console, resume.as_ref());
-    let settings = learning.train();
+    let settings = learning.train_settings();
     let reward = if args.method == MethodName::BcRl { settings.bc_rl.reward } else { settings.ppo.reward };
     let world = |horizon_steps| -> Result<Box<dyn Env>> {
         let pipeline = learning.simulated("learning by trial")?;

@@ -16,7 +16,7 @@ const MOST_BATCH: usize = 1_000_000;
 pub enum RewardKind {
     /// The paper's milestones, each paid once an episode: nothing on the way to them.
     Staged,
-    /// How far the task has come, in every step: see `tasks::reward`.
+    /// How far the task has come, in every step: see `tasks::dense_reward`.
     Dense,
 }
 

@@ -1,6 +1,6 @@
 //! Texts for programs that are not hilt. Their first line says that hilt wrote them: such a file may be replaced, another not.
 
-use crate::robot::urdf::XML_LINE;
+use crate::robot::write_urdf::XML_LINE;
 
 /// How a URDF of hilt begins.
 const URDF: &str = "<!-- by hilt ";

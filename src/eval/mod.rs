@@ -4,16 +4,16 @@
 //! `select.scene` and `select.noise`. Demonstrations are drawn from `plan.scene` and `simulate.noise`: the purpose is part of a
 //! stream's name, so that no evaluation episode repeats a demonstration or had a say in the selection, whatever the seeds.
 
-mod difference;
 mod log;
 mod policy;
+mod rate_difference;
 mod replay;
 mod summary;
 mod wilson;
 
-pub use difference::{Pairs, newcombe_95};
 pub use log::to_table;
 pub use policy::PolicyController;
+pub use rate_difference::{Pairs, newcombe_95};
 pub use replay::{Moment, Replay};
 pub use summary::{Percentiles, Summary};
 pub use wilson::wilson_95;

@@ -162,8 +162,10 @@ fn check_variation(variation: &Variation) -> std::result::Result<(), String> {
         return Err(format!("method_set is read by none of its stages ({})", stages.join(", ")));
     }
     check_method_set(&variation.method_set)?;
-    let unchanged = |method: &MethodName| all_of(&variation.set, &not_of(*method)) && !variation.method_set.contains_key(method);
-    match variation.methods.iter().find(|method| unchanged(method)) {
+    let unchanged = |method: &&MethodName| {
+        !variation.set.is_empty() && !variation.method_set.contains_key(method) && changes_nothing(&variation.set, **method)
+    };
+    match variation.methods.iter().find(unchanged) {
         Some(method) => {
             let (method, set) = (method.name(), shown(&variation.set.join(" ")));
             Err(format!("\"{set}\" changes nothing of method {method}: limit the variation by methods = [...]"))
@@ -175,13 +177,15 @@ fn check_variation(variation: &Variation) -> std::result::Result<(), String> {
 /// Every setting of a method alone must do something for it.
 fn check_method_set(sets: &MethodSets) -> std::result::Result<(), String> {
     for (method, set) in sets {
-        if let Some(set) = set.iter().find(|set| all_of(std::slice::from_ref(*set), &not_of(*method))) {
+        if let Some(set) = set.iter().find(|set| changes_nothing(std::slice::from_ref(*set), *method)) {
             return Err(format!("method_set: \"{}\" changes nothing of method {}", shown(set), method.name()));
         }
     }
     Ok(())
 }
 
-fn all_of(set: &[String], families: &[&str]) -> bool {
-    !set.is_empty() && set.iter().all(|set| families.iter().any(|family| set.trim_start().starts_with(family)))
+/// Whether a method reads none of these settings.
+fn changes_nothing(sets: &[String], method: MethodName) -> bool {
+    let families = not_of(method);
+    sets.iter().all(|set| families.iter().any(|family| set.trim_start().starts_with(family)))
 }

@@ -8,8 +8,8 @@ mod hand;
 pub mod ik;
 pub mod model;
 mod motors;
-pub mod urdf;
+pub mod write_urdf;
 
 pub use ik::{Ik, Unreachable};
 pub use model::Robot;
-pub use urdf::{TOOL_FRAME, urdf};
+pub use write_urdf::{TOOL_FRAME, urdf};

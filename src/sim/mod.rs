@@ -11,7 +11,7 @@ mod follower;
 #[cfg(test)]
 mod free_motion_tests;
 mod physics;
-mod replay;
+mod reexecute;
 mod world;
 
 pub use disturbance::Disturbance;
@@ -19,5 +19,5 @@ pub use env::TaskEnv;
 pub use episode::{Controller, fallen, run_episode, run_episode_from};
 pub use follower::Follower;
 pub use physics::{Grain, Physics};
-pub use replay::reexecute;
+pub use reexecute::reexecute;
 pub use world::World;

@@ -1,6 +1,7 @@
 //! What follows from a task's file: scene, named success conditions, milestones of the reward and a dense one, failure classes, layout. One
 //! file a kind of goal.
 
+mod dense_reward;
 mod goal;
 mod inside;
 mod kind;
@@ -10,17 +11,16 @@ mod monitor;
 mod observation;
 mod on;
 mod place;
-mod reward;
 mod spawn;
 
 pub use crate::task::{FailureClass, Task};
+pub use dense_reward::dense;
 pub use goal::Kind;
 pub use layout::with_layout;
 pub use monitor::{Monitor, Verdict};
 pub use observation::Observation;
 pub use on::ALIGNED_M;
 pub use place::MIN_TRAVEL_M;
-pub use reward::dense;
 pub use spawn::{draw_scene, scene_of};
 
 use crate::scene::Scene;

@@ -3,7 +3,7 @@
 use super::surroundings::{Thing, WORLD_FRAME, frame_of, things};
 use crate::demo::Step;
 use crate::robot::Robot;
-use crate::robot::urdf::{Geometry, Solid};
+use crate::robot::write_urdf::{Geometry, Solid};
 use crate::scene::Scene;
 use crate::state::{Pose, State};
 use foxglove::messages::{

@@ -1,6 +1,6 @@
 //! What stands around the robot, as viewers draw it: once as Foxglove's messages have it, once as a URDF.
 
-use crate::robot::urdf::{Body, Geometry, Solid, scene_urdf as urdf};
+use crate::robot::write_urdf::{Body, Geometry, Solid, scene_urdf as urdf};
 use crate::scene::Scene;
 use crate::task::Shape;
 

@@ -1,6 +1,8 @@
-//! Algorithm 2: behavior cloning. L_BC (Eq. 3) and the degree of policy convergence d_conv (Eq. 4) over the states of the demos.
+//! Algorithm 2: behavior cloning. L_BC (Eq. 3) over the states of the demos, and the degree of policy convergence d_conv there
+//! ([`super::convergence`]).
 
 use super::acted::{Acted, Shard};
+use super::convergence::p_t;
 use super::policy_loss::PolicyLoss;
 use super::shards;
 use crate::config::{ActionChoice, Convergence, Objective, TrainSettings};
@@ -145,11 +147,12 @@ impl Part {
             let (mut loss, mut error2) = (Lanes::default(), Lanes::default());
             for (i, unit) in unit.iter().enumerate() {
                 let weight = if raw { unit * unit } else { 1.0 };
-                let (label, mut mean) = (&mut d_mean.panel_mut(p)[i], shard.pass.output.panel(p)[i]);
+                let (slot, mut mean) = (&mut d_mean.panel_mut(p)[i], shard.pass.output.panel(p)[i]);
+                let label = *slot;
                 if rows.len() < LANES {
-                    mean.take_from(rows.len(), *label); // no error where there is no row
+                    mean.take_from(rows.len(), label); // no error where there is no row
                 }
-                let residual = mean - *label;
+                let residual = mean - label;
                 let shift = if sampled { self.noise.panel(p)[i] * self.sigma[i] } else { Lanes::default() };
                 let error = residual + shift;
                 let slope = error * (2.0 * scale * weight);
@@ -157,19 +160,12 @@ impl Part {
                 error2 += residual * residual;
                 self.residual2[i] += (residual * residual).sum();
                 self.d_log_std[i] += (slope * shift).sum();
-                *label = slope;
+                *slot = slope; // the gradient where the label was
             }
             self.loss += loss.0.iter().map(|loss| f64::from(scale * loss)).sum::<f64>();
             for lane in 0..rows.len() {
-                self.agreement += match choices.convergence {
-                    Convergence::SampledDensity => {
-                        let eps = self.noise.panel(p).iter().map(|noise| noise.0[lane]);
-                        gaussian::sample_density(&policy.log_std, unit, eps)
-                    }
-                    Convergence::Agreement => {
-                        f64::from(exp_f32(-0.5 * error2.0[lane] / (dim as f32 * choices.tau * choices.tau)))
-                    }
-                };
+                let eps = |i: usize| self.noise.panel(p)[i].0[lane];
+                self.agreement += p_t(choices.convergence, choices.tau, policy, error2.0[lane], eps);
             }
         }
     }

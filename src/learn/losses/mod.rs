@@ -2,6 +2,7 @@
 
 mod acted;
 pub mod behavior_cloning;
+pub mod convergence;
 pub mod model_loss;
 mod offsets;
 mod policy_loss;

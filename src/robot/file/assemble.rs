@@ -2,8 +2,8 @@
 
 use super::body::{ALIGNED_RAD, Body, FindMesh};
 use super::description::{Description, JointOverride, MotorEntry, Read};
+use super::read_urdf::{JointElement, LinkElement, Urdf, isometry};
 use super::tree::{check_names, foot};
-use super::xml::{JointElement, LinkElement, Urdf, isometry};
 use crate::joints::Joints;
 use crate::robot::hand::opposing;
 use crate::robot::model::{Joint, JointKind, Motor, Posture, Robot};

@@ -2,7 +2,7 @@
 
 use super::description::ShapeEntry;
 use super::mesh::bounds_of_stl;
-use super::xml::{Geometry, LinkElement, isometry};
+use super::read_urdf::{Geometry, LinkElement, isometry};
 use crate::robot::model::{Inertia, Link, Shape};
 use crate::words::shown;
 use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, Translation3, UnitQuaternion, Vector3};

@@ -2,7 +2,7 @@
 
 use super::assemble::assemble;
 use super::description::Description;
-use super::xml;
+use super::read_urdf;
 use crate::error::{Error, Result};
 use crate::robot::model::Robot;
 use crate::words::unknown;
@@ -35,7 +35,7 @@ pub fn names() -> [&'static str; FILES.len()] {
 pub fn named(name: &str) -> Option<std::result::Result<Robot, String>> {
     let (_, description, urdf) = FILES.iter().find(|(known, ..)| *known == name)?;
     let read = || {
-        let (description, document) = (Description::parse(description)?, xml::read(urdf)?);
+        let (description, document) = (Description::parse(description)?, read_urdf::read(urdf)?);
         assemble(&description, &document, &|mesh| Err(format!("{mesh}: a built-in robot has no meshes"))).map(|read| read.robot)
     };
     Some(read())

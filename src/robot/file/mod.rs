@@ -6,8 +6,8 @@ pub mod built_in;
 pub mod description;
 mod draft;
 mod mesh;
+mod read_urdf;
 mod tree;
-mod xml;
 
 use crate::error::{Error, Result};
 use crate::interrupt::Interrupt;
@@ -26,7 +26,7 @@ pub fn read(path: &Path) -> Result<Read> {
     let description = Description::parse(&text_of(path)?).map_err(|why| Error::input(path, why))?;
     let directory = path.parent().unwrap_or(Path::new("."));
     let urdf = directory.join(&description.urdf);
-    let document = xml::read(&text_of(&urdf)?).map_err(|why| Error::input(&urdf, why))?;
+    let document = read_urdf::read(&text_of(&urdf)?).map_err(|why| Error::input(&urdf, why))?;
     let places = [directory_of(path), directory_of(&urdf)];
     let mesh = |name: &str| mesh_path(name, &description.packages, &places);
     assemble(&description, &document, &mesh).map_err(|why| Error::input(path, why))
@@ -37,15 +37,15 @@ pub fn read(path: &Path) -> Result<Read> {
 /// # Errors
 /// [`Error::Io`] for a file that cannot be read; [`Error::Input`] says what is wrong in it, or lacks: a hand of two fingers that close on each other.
 pub fn draft(urdf: &Path, interrupt: &Interrupt) -> Result<String> {
-    let document = xml::read(&text_of(urdf)?).map_err(|why| Error::input(urdf, why))?;
+    let document = read_urdf::read(&text_of(urdf)?).map_err(|why| Error::input(urdf, why))?;
     let places = [directory_of(urdf)];
     draft::draft(urdf, &document, &|name| mesh_path(name, &BTreeMap::new(), &places), interrupt)
 }
 
 fn text_of(path: &Path) -> Result<String> {
     let io = |e| Error::io(path, "read", e);
-    if fs::metadata(path).map_err(io)?.len() > xml::LONGEST_FILE {
-        return Err(Error::input(path, format!("longer than {} bytes: no description of a robot", xml::LONGEST_FILE)));
+    if fs::metadata(path).map_err(io)?.len() > read_urdf::LONGEST_FILE {
+        return Err(Error::input(path, format!("longer than {} bytes: no description of a robot", read_urdf::LONGEST_FILE)));
     }
     String::from_utf8(fs::read(path).map_err(io)?).map_err(|_| Error::input(path, "not UTF-8 text"))
 }

@@ -1,7 +1,7 @@
 //! Whether links and joints make a robot at all, and whether the description names what is there.
 
 use super::description::{Description, ShapeEntry};
-use super::xml::{JointElement, Urdf};
+use super::read_urdf::{JointElement, Urdf};
 use crate::layout::MOST_ARM_JOINTS;
 use crate::words::{did_you_mean, shown};
 use std::collections::{BTreeMap, BTreeSet};

@@ -1,6 +1,6 @@
 //! The keys that shape L_SC, and what they make of the demos.
 
-use crate::config::{ActionChoice, FingerCloning, Objective, Pairs, StateScale, TrainSettings};
+use crate::config::{ActionChoice, FingerCloning, Objective, StateScale, TrainSettings};
 use crate::layout::Layout;
 use crate::learn::models::{Corpus, STEP_FLOOR, Scaling};
 use std::ops::Range;
@@ -49,10 +49,6 @@ pub struct Choices {
     pub knees: Vec<f32>,
     /// Whether L_SC is a sum over a demo instead of a mean.
     objective: Objective,
-    /// Which pairs enter B.
-    pub pairs: Pairs,
-    /// rho.
-    pub rho: f64,
     /// Whether actions are sampled.
     pub action: ActionChoice,
 }
@@ -90,8 +86,6 @@ impl Choices {
             taught: (0..corpus.rows()).flat_map(|r| taught_fingers(settings.sc.fingers, corpus, r)).collect(),
             straight_through: settings.sc.fingers == FingerCloning::StraightThrough,
             objective: settings.loss,
-            pairs: settings.sc.pairs,
-            rho: settings.rho,
             action: settings.action,
         }
     }

@@ -15,9 +15,9 @@ pub struct Batch<'a> {
     pub demos: usize,
     /// What the coins of stochastic recovery have left: [`super::draw_segments`].
     pub segments: &'a [Segment],
-    /// Standard normal numbers, rows x 9; empty when the mean is taken.
+    /// Standard normal numbers, rows x A; empty when the mean is taken.
     pub noise: &'a [f32],
-    /// Disturbances of the rollouts' actions \[rad/s\], rows x 9; empty when there are none.
+    /// Disturbances of the rollouts' actions \[rad/s\], rows x A; empty when there are none.
     pub pushes: &'a [f32],
 }
 
@@ -28,7 +28,7 @@ pub struct Setting<'a> {
     pub policy: &'a Policy,
     /// f_phi.
     pub dynamics: &'a Dynamics,
-    /// The policy's mean actions in the demos' states, standardised, rows x 9.
+    /// The policy's mean actions in the demos' states, standardised, rows x A.
     pub mean: &'a [f32],
     /// The demos.
     pub batch: Batch<'a>,

@@ -9,7 +9,7 @@
 //! deviation of the actions is L_RL's alone.
 
 mod demos;
-mod method;
+mod stages;
 #[cfg(test)]
 mod tests;
 

@@ -1,8 +1,8 @@
 //! Algorithm 1: hybrid imitation learning. Pure behavior cloning, pure state cloning and a fixed mixture are the same loop with
 //! another alpha.
 
-mod method;
 mod metrics;
+mod stages;
 mod warm_start;
 
 pub use metrics::METRICS;
@@ -53,9 +53,9 @@ struct Work {
     acted: Acted,
     offsets: Offsets,
     bc_choices: bc::Choices,
-    bc: bc::Workspace,
+    bc_work: bc::Workspace,
     sc_choices: sc::Choices,
-    sc: sc::Workspace,
+    sc_work: sc::Workspace,
     segments: Vec<Segment>,
     noise: Vec<f32>,
     pushes: Pushes,
@@ -100,9 +100,9 @@ impl Hil {
             acted: Acted::new(&policy, most_rows),
             offsets: Offsets::new(&settings.randomise, policy.features())?,
             bc_choices: bc::Choices::new(&settings),
-            bc: bc::Workspace::new(dim, most_rows),
+            bc_work: bc::Workspace::new(dim, most_rows),
             sc_choices: sc::Choices::new(&settings, corpus),
-            sc: sc::Workspace::new(dim, most_rows),
+            sc_work: sc::Workspace::new(dim, most_rows),
             segments: Vec::with_capacity(most_rows),
             noise: Vec::with_capacity(most_rows * dim),
             pushes: Pushes::new(&settings.sc, &corpus.layout, most_rows),
@@ -154,7 +154,7 @@ impl Hil {
         self.draws += 1;
         let finite = self.judge();
         let (corpus, descent, mixing) = (&self.inputs.train, &mut self.descent, &mut self.mixing);
-        let Work { rows, acted, offsets, bc_choices, bc, sc_choices, sc, segments, noise, pushes } = &mut self.work;
+        let Work { rows, acted, offsets, bc_choices, bc_work, sc_choices, sc_work, segments, noise, pushes } = &mut self.work;
         corpus.rows_of(demos, rows);
         let samples = PolicySamples { corpus, policy: &descent.policy };
         let offsets = offsets.draw(rows.len(), &mut stream(self.seed, OFFSETS, self.draws));
@@ -163,7 +163,7 @@ impl Hil {
         // Algorithm 2, Eq. 3-4
         let mut rng = stream(self.seed, "train.bc", self.draws);
         let batch = bc::Batch { samples, rows, demos: demos.len() as f64 };
-        let (l_bc, d_conv) = behavior_cloning(acted, batch, bc_choices, &mut rng, bc);
+        let (l_bc, d_conv) = behavior_cloning(acted, batch, bc_choices, &mut rng, bc_work);
         finite(l_bc.name, l_bc.value, BC_REMEDY)?;
         let alpha = mixing.weight(d_conv); // alpha_e = d_conv, no gradient through it
 
@@ -171,23 +171,23 @@ impl Hil {
         let l_sc = match &self.model {
             Some(model) if alpha > 0.0 => {
                 let (mut rng, lengths) = (stream(self.seed, "train.sc", self.draws), demos.iter().map(|d| corpus.demo(*d).len()));
-                draw_segments(lengths.clone(), sc_choices.rho, sc_choices.pairs, &mut rng, segments);
+                draw_segments(lengths.clone(), self.settings.rho, self.settings.sc.pairs, &mut rng, segments);
                 let sampled = sc_choices.action == ActionChoice::Sample;
                 draw_noise(sampled, rows.len() * corpus.layout.action_dim(), &mut rng, noise);
                 pushes.draw(lengths, &mut rng);
                 let batch = sc::Batch { corpus, rows, demos: demos.len(), segments, noise, pushes: pushes.rows() };
-                let l_sc = state_cloning(&descent.policy, &model.dynamics, acted, batch, sc_choices, sc);
+                let l_sc = state_cloning(&descent.policy, &model.dynamics, acted, batch, sc_choices, sc_work);
                 finite(l_sc.name, l_sc.value, SC_REMEDY)?;
                 Some(l_sc)
             }
             _ => None,
         };
         if let Some(row) = norms {
-            let bc = descent.gradient_norm(acted, 1.0 * l_bc);
-            let sc = l_sc.map_or(f64::NAN, |l_sc| descent.gradient_norm(acted, 1.0 * l_sc));
-            mixing.see_norms(bc, sc);
-            row.set("grad_bc", bc);
-            row.set("grad_sc", sc);
+            let bc_norm = descent.gradient_norm(acted, 1.0 * l_bc);
+            let sc_norm = l_sc.map_or(f64::NAN, |l_sc| descent.gradient_norm(acted, 1.0 * l_sc));
+            mixing.see_norms(bc_norm, sc_norm);
+            row.set("grad_bc", bc_norm);
+            row.set("grad_sc", sc_norm);
         }
 
         let l_mix = match l_sc {

@@ -39,14 +39,14 @@ impl Hil {
     pub fn clone_behavior(&mut self, rows: &[usize], learning_rate: f64) -> Result<Update> {
         self.draws += 1;
         let finite = self.judge();
-        let (corpus, descent, Work { acted, offsets, bc_choices, bc, .. }) =
+        let (corpus, descent, Work { acted, offsets, bc_choices, bc_work, .. }) =
             (&self.inputs.train, &mut self.descent, &mut self.work);
         let samples = PolicySamples { corpus, policy: &descent.policy };
         let offsets = offsets.draw(rows.len(), &mut stream(self.seed, OFFSETS, self.draws));
         acted.forward(samples, rows, Some(offsets));
         let batch = Batch { samples, rows, demos: rows.len() as f64 / corpus.mean_length() };
         let mut rng = stream(self.seed, "train.bc", self.draws);
-        let (l_bc, d_conv) = behavior_cloning(acted, batch, bc_choices, &mut rng, bc);
+        let (l_bc, d_conv) = behavior_cloning(acted, batch, bc_choices, &mut rng, bc_work);
         finite(l_bc.name, l_bc.value, BC_REMEDY)?;
         descent.update(acted, 1.0 * l_bc, learning_rate);
         Ok(Update { l_bc: l_bc.value, l_sc: f64::NAN, l_mix: l_bc.value, d_conv, alpha: 0.0, l_model: f64::NAN })

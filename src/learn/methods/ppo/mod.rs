@@ -14,9 +14,9 @@ mod advantage;
 mod beginning;
 mod episodes;
 mod group;
-mod method;
 mod metrics;
 mod objective;
+mod stages;
 mod state;
 mod statistics;
 #[cfg(test)]

@@ -1,6 +1,6 @@
 //! Which joints of a URDF are the arm's and the fingers', by how they hang on each other.
 
-use crate::robot::file::xml::{JointElement, Urdf};
+use crate::robot::file::read_urdf::{JointElement, Urdf};
 use std::collections::BTreeMap;
 
 /// The joints by their part.
