@@ -1,11 +1,10 @@
 //! From an experiment to its runs and the steps that they share.
 
 use super::builder::{At, Builder};
-use super::resolve::cell;
+use super::resolve::cells;
 use super::runs::{Grid, Run};
 use super::spec::{Experiment, Variation};
 use crate::error::{Error, Result};
-use crate::learn::MethodName;
 use std::collections::HashMap;
 use std::path::Path;
 
@@ -24,16 +23,18 @@ impl Grid {
             let (file, seeds) = (experiment.path.display(), experiment.seeds.len());
             return Err(Error::Usage(format!("{file}: {of_a_seed} x {seeds} runs; allowed: up to {MOST_RUNS}")));
         }
-        let mut cells = Vec::new();
+        let mut resolved = Vec::new();
         for (t, task) in experiment.tasks.iter().enumerate() {
             for (p, preset) in experiment.presets.iter().enumerate() {
-                let plain = |method: &MethodName| cell(experiment, task, preset, None, *method);
-                let base = experiment.methods.iter().map(plain).collect::<Result<Vec<_>>>()?;
+                let plain = cells(experiment, task, preset, None)?;
                 for (v, variation) in variations.iter().enumerate() {
-                    for (m, method) in experiment.methods.iter().enumerate() {
-                        if variation.is_none_or(|v| v.tasks.contains(task) && v.methods.contains(method)) {
-                            let settings = cell(experiment, task, preset, *variation, *method)?;
-                            cells.push(([t, p, v, m], settings, base[m].clone()));
+                    if variation.is_some_and(|v| !v.tasks.contains(task)) {
+                        continue;
+                    }
+                    let varied = cells(experiment, task, preset, *variation)?;
+                    for (m, (settings, base)) in varied.into_iter().zip(&plain).enumerate() {
+                        if variation.is_none_or(|v| v.methods.contains(&experiment.methods[m])) {
+                            resolved.push(([t, p, v, m], settings, base.clone()));
                         }
                     }
                 }
@@ -42,7 +43,7 @@ impl Grid {
         let mut builder = Builder::new(experiment, dir);
         let mut runs = Vec::new();
         for (s, seed) in experiment.seeds.iter().enumerate() {
-            for ([t, p, v, m], settings, base) in &cells {
+            for ([t, p, v, m], settings, base) in &resolved {
                 let (task, preset) = (&experiment.tasks[*t], &experiment.presets[*p]);
                 let at = At { task, preset, variation: variations[*v], seed: *seed };
                 runs.push(([*t, *p, *v, *m, s], builder.run(&at, experiment.methods[*m], settings, base)?));

@@ -71,16 +71,28 @@ pub struct StageSettings {
 /// The settings of all stages, by their order.
 pub type Cell = [StageSettings; 6];
 
-/// The settings of `task` under a preset, with a variation's over them; where both have settings of the method alone, these go over their others.
+/// The settings of `task` under a preset, with a variation's over them, for each of the experiment's methods; where both have settings of the
+/// method alone, these go over their others.
 ///
 /// # Errors
 /// [`Error::Usage`] names what is wrong and where.
-pub fn cell(
+pub fn cells(experiment: &Experiment, task: &str, preset: &str, variation: Option<&Variation>) -> Result<Vec<Cell>> {
+    let shared = cell(experiment, task, preset, variation, None)?;
+    let has_own =
+        |method| experiment.method_set.contains_key(method) || variation.is_some_and(|v| v.method_set.contains_key(method));
+    let of = |method: &MethodName| {
+        if has_own(method) { cell(experiment, task, preset, variation, Some(*method)) } else { Ok(shared.clone()) }
+    };
+    experiment.methods.iter().map(of).collect()
+}
+
+/// The same for one method, or for those without settings of their own.
+fn cell(
     experiment: &Experiment,
     task: &str,
     preset: &str,
     variation: Option<&Variation>,
-    method: MethodName,
+    method: Option<MethodName>,
 ) -> Result<Cell> {
     let at = match variation {
         Some(variation) => format!("{}: variation \"{}\"", experiment.path.display(), variation.name),
@@ -94,7 +106,7 @@ pub fn cell(
     checked.map_err(|why| Error::Usage(format!("{at}: {why}")))?;
     let said = experiment.tasks.iter().zip(&experiment.said).find(|(name, _)| *name == task).map_or(task, |(_, said)| said);
     let (source, words) = source_of((task, said), preset).map_err(|why| Error::Usage(format!("{at}: {why}")))?;
-    let own_of = |sets: &MethodSets| sets.get(&method).cloned().unwrap_or_default();
+    let own_of = |sets: &MethodSets| method.and_then(|method| sets.get(&method)).cloned().unwrap_or_default();
     let stages = Stage::ALL.map(|stage| {
         let varied = variation.filter(|v| v.stages.contains(&stage));
         let varied = varied.map(|v| [v.set.clone(), own_of(&v.method_set)].concat()).unwrap_or_default();

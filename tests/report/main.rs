@@ -153,7 +153,7 @@ fn a_part_is_shown_as_a_part_and_nothing_is_refused() {
     place.done(&["report", "tiny.toml", "--out", "page"]);
     check(&place.at("page"));
     let html = fs::read_to_string(place.at("page/index.html")).expect("a page");
-    assert!(html.contains("3 of 6 runs are there") && html.contains("seeds 12"), "{html}");
+    assert!(html.contains("3 of 6 runs are there") && html.contains("pick-up, seeds 12: all 3"), "{html}");
     let said = place.done(&["report", "tiny.toml", "--seeds", "11,99", "--out", "page"]);
     assert!(said.contains("3 of 3 runs"), "{said}");
     place.refused(&["report", "tiny.toml", "--seeds", "99", "--out", "page"], 2, "tiny has none of them");

@@ -23,17 +23,30 @@ pub fn head(finished: &Finished) -> Vec<Block> {
     blocks
 }
 
-/// Seeds of unfinished runs, an item an arm and task.
+/// Unfinished runs: an item a task and seeds, with the arms that lack them.
 fn missing(finished: &Finished) -> Vec<String> {
-    let mut items: Vec<((Arm, &str), Vec<u64>)> = Vec::new();
-    for run in finished.grid.runs.iter().filter(|run| finished.contents[run.evaluate].is_none()) {
-        let key = (Arm::of(run), run.task.as_str());
-        match items.iter_mut().find(|(known, _)| *known == key) {
-            Some((_, list)) => list.push(run.seed),
-            None => items.push((key, vec![run.seed])),
+    let lacking = finished.grid.runs.iter().filter(|run| finished.contents[run.evaluate].is_none());
+    let seeds_of = grouped(lacking.map(|run| ((run.task.as_str(), Arm::of(run)), run.seed)));
+    let arms_of = grouped(seeds_of.into_iter().map(|((task, arm), list)| ((task, seeds(&list)), arm)));
+    let every =
+        |task: &str| grouped(finished.grid.runs.iter().filter(|run| run.task == task).map(|run| (Arm::of(run), ()))).len();
+    let item = |((task, seeds), arms): ((&str, String), Vec<Arm>)| {
+        let names: Vec<String> = arms.iter().map(|arm| format!("`{}`", finished.label(*arm))).collect();
+        let names = if arms.len() > 1 && arms.len() == every(task) { format!("all {}", arms.len()) } else { listed(&names) };
+        format!("{task}, seeds {seeds}: {names}")
+    };
+    arms_of.into_iter().map(item).collect()
+}
+
+/// The values of each key, in the order in which the keys came.
+fn grouped<K: PartialEq, V>(pairs: impl Iterator<Item = (K, V)>) -> Vec<(K, Vec<V>)> {
+    pairs.fold(Vec::new(), |mut groups: Vec<(K, Vec<V>)>, (key, value)| {
+        match groups.iter_mut().find(|(known, _)| *known == key) {
+            Some((_, values)) => values.push(value),
+            None => groups.push((key, vec![value])),
         }
-    }
-    items.iter().map(|((arm, task), list)| format!("`{}`, {task}: seeds {}", finished.label(*arm), seeds(list))).collect()
+        groups
+    })
 }
 
 /// A caption's last sentence: what the intervals are.
