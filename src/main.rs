@@ -6,7 +6,7 @@ use console::style;
 use hilt::cmd::{Cli, Outcome};
 use hilt::interrupt::{Interrupt, anyone_waits};
 use hilt::nn::kernel;
-use signal_hook::consts::{SIGINT, SIGTERM, SIGXFSZ};
+use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM, SIGXFSZ};
 use signal_hook::flag;
 use signal_hook::iterator::Signals;
 use std::io::Write;
@@ -19,8 +19,12 @@ use std::time::{Duration, Instant};
 /// Exit code of a process that a signal ended: 128 + its number.
 const SIGNALLED: i32 = 128;
 
-/// Ctrl-C, and what `kill`, `timeout` and batch systems send. A hang-up keeps its meaning, so that `nohup` works.
+/// Ctrl-C, and what `kill`, `timeout` and batch systems send; and a terminal that is gone, unless `nohup` has it ignored.
 const INTERRUPTS: [i32; 2] = [SIGINT, SIGTERM];
+
+/// Where Linux says which signals are ignored, a bit each, in hexadecimal digits.
+const STATUS: &str = "/proc/self/status";
+const IGNORED: &str = "SigIgn:";
 
 /// A second signal counts only after this time: a signal to the whole process group, which `make` passes on once more, arrives twice.
 const SAME_SIGNAL: Duration = Duration::from_secs(1);
@@ -60,8 +64,16 @@ fn main() -> ExitCode {
 /// process's end.
 fn listen(interrupt: Interrupt) -> std::io::Result<()> {
     flag::register(SIGXFSZ, Arc::<AtomicBool>::default())?;
-    let signals = Signals::new(INTERRUPTS)?;
+    let signals = Signals::new(INTERRUPTS.into_iter().chain((!ignored(SIGHUP)).then_some(SIGHUP)))?;
     thread::Builder::new().name("signals".into()).spawn(move || watch(signals, &interrupt)).map(drop)
+}
+
+/// Whether this signal was ignored when the process began; where that cannot be known it counts as ignored.
+fn ignored(signal: i32) -> bool {
+    let status = std::fs::read_to_string(STATUS).unwrap_or_default();
+    let digits = status.lines().find_map(|line| line.strip_prefix(IGNORED));
+    let set = digits.and_then(|digits| u64::from_str_radix(digits.trim(), 16).ok());
+    set.is_none_or(|set| set >> (signal - 1) & 1 == 1)
 }
 
 fn watch(mut signals: Signals, interrupt: &Interrupt) {

@@ -100,6 +100,13 @@ fn what_a_hilt_toml_says_counts_below_it_and_flags_win() {
     refused(&below, &["doctor"], 1, &["1 of"]);
     ok(&below, &["settings", "--task", "stack", "--config", "none"]);
     refused(&below, &["settings", "--task", "stack", "--config", "missing.toml"], 1, &["missing.toml"]);
+    write("task = \"nope\"\n");
+    refused(&below, &["settings"], 2, &["hilt.toml: task: ", "nope"]);
+    fs::remove_file(dir.path().join("hilt.toml")).expect("removed");
+    // A link that leads nowhere says something, and is not passed over.
+    std::os::unix::fs::symlink("../gone/hilt.toml", dir.path().join("hilt.toml")).expect("linked");
+    refused(&below, &["settings", "--task", "stack"], 1, &["hilt.toml: cannot read"]);
+    fs::remove_file(dir.path().join("hilt.toml")).expect("removed");
     write("task = \"stack\"\n");
     // No output of a command may take its place.
     refused(&below, &["plan", "--episodes", "1", "--out", "../../hilt.toml"], 2, &["hilt.toml"]);

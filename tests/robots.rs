@@ -80,7 +80,9 @@ fn the_jacobian_of_a_read_robot_equals_finite_differences() {
 #[test]
 fn impossible_descriptions_are_refused_with_what_to_do() {
     type Spoiling = &'static [(&'static str, &'static str)];
-    let cases: [(Spoiling, Spoiling, &str); 30] = [
+    let cases: [(Spoiling, Spoiling, &str); 32] = [
+        (&[("name = \"five\"", "name = \"\"")], &[], "name = \"\" is no name of a directory"),
+        (&[("name = \"five\"", "name = \"../five\"")], &[], "is no name of a directory"),
         (&[("reach_m = [0.20, 0.62]", "reach_m = [0.7, 0.62]")], &[], "the nearer first"),
         (
             &[],

@@ -75,6 +75,10 @@ impl<'a> Keeper<'a> {
     /// # Errors
     /// [`Error::Io`] when the system refuses.
     pub fn remove(self) -> Result<()> {
+        // Of weights that go to a device nothing is kept, and a device stays.
+        if !self.path.is_file() {
+            return Ok(());
+        }
         match fs::remove_file(self.path) {
             Err(e) if e.kind() != std::io::ErrorKind::NotFound => Err(Error::io(self.path, "remove", e)),
             _ => Ok(()),

@@ -22,7 +22,7 @@ use std::time::Instant;
     name = "hilt",
     version,
     max_term_width = 100,
-    after_help = "Exit codes: 0 done, 1 failed, 2 wrong usage, 3 done but episodes were dropped, 130 interrupted (143 by SIGTERM).\n\
+    after_help = "Exit codes: 0 done, 1 failed, 2 wrong usage, 3 done but episodes were dropped, 130 interrupted (143 by SIGTERM, 129 by SIGHUP).\n\
                   Results go to stdout, words and progress to stderr."
 )]
 pub struct Cli {
@@ -118,6 +118,10 @@ impl Cli {
         }
         match outcome {
             Ok(Outcome::Dropped(_)) if self.allow_dropped => Ok(Outcome::Done),
+            Err(why) => {
+                context.console.log_error(&why);
+                Err(why)
+            }
             other => other,
         }
     }

@@ -41,7 +41,7 @@ pub struct SettingsArgs {
     #[arg(long, value_name = "TEXT")]
     sets: Option<String>,
     /// Seed of every random number
-    #[arg(long, value_name = "S", default_value_t = 0)]
+    #[arg(long, value_name = "S", default_value_t = 0, allow_negative_numbers = true)]
     pub seed: u64,
 }
 
@@ -101,11 +101,18 @@ impl SettingsArgs {
         let task = self.task.clone().or_else(|| made.map(|made| made.task.clone())).or(own_task);
         let robot = self.robot.clone().or_else(|| made?.robot.clone()).or_else(|| project?.robot.clone());
         let preset = self.preset.or_else(|| project?.preset);
+        let from_project = project.filter(|project| self.task.is_none() && task.is_some() && task == project.task);
+        let chosen = |said: &str| match from_project {
+            Some(project) => {
+                ChosenTask::read(said).map_err(|why| Error::Usage(format!("{}: task: {why}", project.path.display())))
+            }
+            None => task_said(said),
+        };
         let source = match (file, task.as_deref()) {
-            (Some(path), said) => Source::File(path, said.map(task_said).transpose()?),
+            (Some(path), said) => Source::File(path, said.map(chosen).transpose()?),
             // A task's file is a pipeline file.
             (None, Some(said)) if preset.is_none() && config::is_file(said) => Source::File(said.into(), None),
-            (None, Some(said)) => Source::BuiltIn(task_said(said)?, preset.unwrap_or_default()),
+            (None, Some(said)) => Source::BuiltIn(chosen(said)?, preset.unwrap_or_default()),
             (None, None) => {
                 let tasks = built_in::names().join(", ");
                 return Err(Error::Usage(format!("which task? give --task ({tasks}, or a file) or --pipeline FILE")));
@@ -201,7 +208,8 @@ fn split(text: &str) -> Vec<String> {
 
 /// `train.rho` and 2 as they were typed: `--rho 2`.
 fn flag_text(key: &str, value: &str) -> String {
-    format!("--{} {value}", key.rsplit('.').next().unwrap_or(key))
+    // A unit belongs to a setting's name, not to the flag's.
+    format!("--{} {value}", key.rsplit('.').next().unwrap_or(key).trim_end_matches("_steps"))
 }
 
 /// A refusal of a flag names the flag, not the setting that it stands for.

@@ -63,6 +63,11 @@ impl Console {
         }
     }
 
+    /// The last line of the log of a command that failed; stderr has it from who ends the process.
+    pub fn log_error(&self, why: &Error) {
+        self.to_log(&format!("error: {why}"));
+    }
+
     fn to_log(&self, line: &str) {
         if let Some(mut log) = self.log.get().and_then(|log| log.lock().ok()) {
             let _ = writeln!(log, "{line}");

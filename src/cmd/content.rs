@@ -1,11 +1,13 @@
 //! What is written to a place: the name that it must have, and what standing there it may replace.
 
 use crate::data::atomic::{self, Target};
-use crate::data::peek::{Format, Peeked, peek};
+use crate::data::peek::{Format, PICTURE, Peeked, peek};
 use crate::data::{dataset, live_file, onnx, recording};
 use crate::error::{Error, Result};
+use crate::interrupt;
 use std::ffi::OsStr;
 use std::fs;
+use std::io::Read;
 use std::path::{Path, PathBuf};
 
 /// What is written to a place.
@@ -41,8 +43,8 @@ pub enum Content {
     Recording(&'static str),
     /// A directory of recordings of this stage.
     Recordings(&'static str),
-    /// A directory with the two datasets.
-    Datasets,
+    /// A directory with the two datasets of this stage.
+    Datasets(&'static str),
     /// One dataset.
     Dataset,
     /// A directory with a page, figures and tables.
@@ -99,7 +101,7 @@ pub(super) fn check_ending(name: &str, path: &Path, content: Content) -> Result<
         Content::Recording(_) => ("mcap", "a recording"),
         Content::Log => ("log", "a log"),
         Content::Recordings(_)
-        | Content::Datasets
+        | Content::Datasets(_)
         | Content::Dataset
         | Content::Report
         | Content::Pieces
@@ -123,13 +125,15 @@ pub(super) fn check_held(name: &str, path: &Path, content: Content) -> Result<()
         Content::Summary(stage) => (Format::Json, Some(stage), None),
         Content::Onnx => (Format::Onnx, Some(onnx::EXPORT), None),
         Content::Urdf | Content::Man => (Format::Marked, None, None),
-        Content::Png => (Format::Png, None, None),
-        Content::Gif => (Format::Gif, None, None),
+        Content::Png => (Format::Png, Some(PICTURE), None),
+        Content::Gif => (Format::Gif, Some(PICTURE), None),
         Content::Page => (Format::Html, Some("view"), None),
         Content::Recording(stage) => (Format::Mcap, Some(stage), None),
-        Content::Log | Content::Report | Content::Pieces | Content::Own | Content::Events => return Ok(()),
-        Content::Svg | Content::Csv | Content::Live => return check_text(name, path, content),
-        Content::Datasets | Content::Dataset => return check_dataset(name, path),
+        Content::Pieces | Content::Own | Content::Events => return Ok(()),
+        Content::Svg | Content::Csv | Content::Live | Content::Log => return check_text(name, path, content),
+        Content::Datasets(stage) => return check_dataset(name, path, stage),
+        Content::Dataset => return check_dataset(name, path, EDITED),
+        Content::Report => return check_report(name, path),
         Content::Recordings(stage) => return check_recordings(name, path, stage),
     };
     if is_stream(path) || !path.is_file() {
@@ -147,6 +151,7 @@ fn check_text(name: &str, path: &Path, content: Content) -> Result<()> {
     let ours = || match content {
         Content::Svg => fs::read(path).is_ok_and(|bytes| bytes.trim_ascii_start().starts_with(b"<svg")),
         Content::Live => live_file::is_ours(path),
+        Content::Log => begins_as_a_log(path),
         _ => false,
     };
     if is_stream(path) || !path.is_file() || empty || ours() {
@@ -156,14 +161,40 @@ fn check_text(name: &str, path: &Path, content: Content) -> Result<()> {
     Err(Error::Usage(format!("{name} {path}: is there already, and would be lost; move it away or choose another name")))
 }
 
-/// A dataset that another program wrote has the same files, but is not hilt's to replace.
-fn check_dataset(name: &str, dir: &Path) -> Result<()> {
-    if !dataset::foreign::is_others(dir) {
+/// Whether the first line of a file is one of a log: `train: ...`, or a time.
+fn begins_as_a_log(path: &Path) -> bool {
+    let mut head = Vec::new();
+    let _waits = interrupt::waiting();
+    let read = fs::File::open(path).and_then(|file| file.take(LONGEST_STAGE).read_to_end(&mut head));
+    let text = String::from_utf8_lossy(&head);
+    let is_stage = |word: &str| !word.is_empty() && word.bytes().all(|b| b.is_ascii_lowercase() || b == b'-');
+    read.is_ok() && (text.split_once(": ").is_some_and(|(stage, _)| is_stage(stage)) || text.starts_with("processor time "))
+}
+
+/// Longest name of a stage or task that a log's line begins with.
+const LONGEST_STAGE: u64 = 64;
+
+/// The stage of datasets that `hilt dataset` has made of others.
+pub const EDITED: &str = "dataset";
+
+/// A dataset that another program or stage wrote has the same files, but is not this one's to replace.
+fn check_dataset(name: &str, dir: &Path, stage: &str) -> Result<()> {
+    let Some(holds) = dataset::foreign::of_others(dir, stage) else { return Ok(()) };
+    let dir = dir.display();
+    Err(Error::Usage(format!("{name} {dir}: holds {holds}, which would be lost; choose another directory")))
+}
+
+/// Pages, figures and tables have the names that anybody gives them: a report replaces a report alone.
+fn check_report(name: &str, dir: &Path) -> Result<()> {
+    let seen = |entry: &fs::DirEntry| !entry.file_name().as_encoded_bytes().starts_with(b".");
+    let empty = fs::read_dir(dir).map_or(true, |entries| !entries.flatten().any(|entry| seen(&entry)));
+    let ours = || peek(&dir.join("index.html")).is_ok_and(|found| found.stage.as_deref() == Some("report"));
+    if empty || ours() {
         return Ok(());
     }
     let dir = dir.display();
     Err(Error::Usage(format!(
-        "{name} {dir}: holds a dataset that hilt did not write, which would be lost; choose another directory"
+        "{name} {dir}: is not empty and has no index.html of hilt report; what is there would be lost; choose another directory"
     )))
 }
 

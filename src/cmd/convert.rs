@@ -53,11 +53,17 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome> {
     let pipeline = args.settings.resolve_from(args.recordings.as_deref().map(|dir| (dir, Kind::Recordings)), &[])?;
     let dir = path_or(args.recordings.as_deref(), &pipeline, "recordings");
     let out = path_or(args.out.as_deref(), &pipeline, "dataset");
-    args.settings.places(&context.console).read(&dir).write("--out", &out, Content::Datasets).check(&context.console)?;
+    args.settings
+        .places(&context.console)
+        .read(&dir)
+        .write("--out", &out, Content::Datasets("convert"))
+        .check(&context.console)?;
     let files = recording::files(&dir)?;
     if files.is_empty() {
         return Err(Error::input(&dir, "holds no recording (episode-00000.mcap, ...); run `hilt simulate` first"));
     }
+
+    say_of_gaps(&files, &context.console);
 
     let progress = context.console.progress("convert", files.len() as u64, "recordings");
     let room = Room(AtomicUsize::new(HELD_BYTES));
@@ -108,6 +114,21 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome> {
     let (to, t, v) = (out.display(), train.len(), validation.len());
     context.console.say(&format!("convert: wrote {to}: {t} training and {v} validation episodes"));
     Ok(outcome)
+}
+
+/// Numbers of recordings that are named at most.
+const MOST_NAMED: usize = 5;
+
+/// Says which numbers have no recording: it was dropped when it was made, or it was lost since.
+fn say_of_gaps(files: &[PathBuf], console: &Console) {
+    let numbers: BTreeSet<u64> = files.iter().filter_map(|path| recording::number_of(path.file_name()?.to_str()?)).collect();
+    let Some(last) = numbers.last() else { return };
+    let lacking = last - (numbers.len() as u64 - 1);
+    if lacking > 0 {
+        let first: Vec<String> = (0..*last).filter(|n| !numbers.contains(n)).take(MOST_NAMED).map(|n| n.to_string()).collect();
+        let more = if lacking > first.len() as u64 { ", ..." } else { "" };
+        console.say(&format!("convert: up to episode {last} there are {lacking} recordings missing: {}{more}", first.join(", ")));
+    }
 }
 
 /// Memory that may still be taken \[bytes\].

@@ -190,6 +190,10 @@ impl Learning {
 }
 
 fn own_demos(dir: &Path, pipeline: &Pipeline) -> Result<Demos> {
+    if dataset::provenance(dir).is_ok() {
+        let message = "is one dataset, where training and validation are two: hilt dataset split makes them of it";
+        return Err(Error::input(dir, message));
+    }
     let mut files = BTreeMap::new();
     let mut read = |name: &str| -> Result<Vec<Demo>> {
         let found = dataset::read_for(&dir.join(name), &pipeline.task.name)?;

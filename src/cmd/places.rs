@@ -1,7 +1,7 @@
 //! What a command reads and writes, checked before any work: nothing of the user's is replaced that the command does not replace on purpose.
 
 use super::Console;
-pub use super::content::Content;
+pub use super::content::{Content, EDITED};
 use super::content::{check_ending, check_held};
 use crate::data::atomic::{self, Target};
 use crate::data::{dataset, recording, tensorboard};
@@ -61,7 +61,7 @@ impl Places {
             check_held(name, path, *content)?;
             match content {
                 Content::Recordings(_) => atomic::check_directory(path, recording::is_file)?,
-                Content::Datasets => atomic::check_directory(path, dataset::is_file)?,
+                Content::Datasets(_) => atomic::check_directory(path, dataset::is_file)?,
                 Content::Dataset => atomic::check_directory(path, dataset::is_root_file)?,
                 Content::Report => atomic::check_directory(path, experiments::is_file)?,
                 Content::Events => atomic::check_directory(path, tensorboard::is_file)?,
@@ -125,7 +125,14 @@ fn same(one: &Path, other: &Path) -> bool {
     one == other || number(one).is_some_and(|n| number(other) == Some(n))
 }
 
-/// A file that goes beside `out`: its name with `ending` in place of the format's own, which [`Places`] has checked.
+/// A file that goes beside `out`: its name with `ending` in place of the format's own, which [`Places`] has checked. Nothing goes beside a device or
+/// a pipe.
 pub fn beside(out: &Path, ending: &str) -> PathBuf {
-    out.with_extension(ending)
+    match atomic::target(out) {
+        Ok(Target::Stream(_)) => PathBuf::from(NOWHERE),
+        _ => out.with_extension(ending),
+    }
 }
+
+/// What is written there is gone.
+const NOWHERE: &str = "/dev/null";

@@ -102,15 +102,25 @@ fn watch(args: &Args, context: &Context) -> Result<Outcome> {
     let [of] = args.of.as_slice() else {
         return Err(Error::Usage("--watch follows one training: name one run, or one file of hilt train --live".into()));
     };
+    if !of.is_dir() && !ENDS.iter().any(|end| of.as_os_str().as_encoded_bytes().ends_with(end.as_bytes())) {
+        let (of, known) = (of.display(), ENDS.join(" nor in "));
+        context
+            .console
+            .say(&format!("plot: {of} ends neither in {known}: the end of its training is not seen; Ctrl-C ends this"));
+    }
     let (mut seen, mut waits) = (None, false);
     // In a run training follows, after a pretraining that is over.
     let mut ended: Option<PathBuf> = None;
     while !context.interrupt.is_raised() {
         let live = if of.is_dir() { live_of(of)?.into_iter().next() } else { Some(of.clone()) };
-        match live.filter(|file| file.is_file() && ended.as_ref() != Some(file)) {
+        match live.filter(|file| has_begun(file) && ended.as_ref() != Some(file)) {
             None if !waits && ended.is_none() => {
-                let of = of.display();
-                context.console.say(&format!("plot: waits for a training in {of} that writes its metrics: hilt train --live {of}/policy.training.jsonl, or make all LIVE=1"));
+                let shown = of.display();
+                let advice = match of.extension() {
+                    Some(_) => format!("hilt train --live {shown}"),
+                    None => format!("hilt train --live {shown}/policy.training.jsonl, or make all LIVE=1"),
+                };
+                context.console.say(&format!("plot: waits for a training that writes its metrics: {advice}"));
                 waits = true;
             }
             None => {}
@@ -133,6 +143,14 @@ fn watch(args: &Args, context: &Context) -> Result<Outcome> {
         sleep(TICK);
     }
     Ok(Outcome::Done)
+}
+
+/// Endings of the files that are beside the table that their training ends with.
+const ENDS: [&str; 2] = [".training.jsonl", ".pretraining.jsonl"];
+
+/// Whether something is written: a file begins empty.
+fn has_begun(live: &Path) -> bool {
+    fs::metadata(live).is_ok_and(|found| found.is_file() && found.len() > 0)
 }
 
 /// Time and size.

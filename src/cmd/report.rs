@@ -25,7 +25,7 @@ pub struct Args {
     #[arg(long, value_name = "SEEDS", value_parser = parse_seeds)]
     seeds: Option<Chosen>,
     /// Episodes of each evaluation, where hilt experiment was given them too
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = clap::value_parser!(u64).range(1..))]
     episodes: Option<u64>,
 }
 
@@ -36,7 +36,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome> {
     if shown.is_empty() {
         let dir = args.runs.display();
         return Err(Error::Failed(format!(
-            "{dir}: no run of any experiment is finished; make table3, or hilt experiment NAME, makes them"
+            "{dir}: no run of an experiment that comes with hilt is finished; make table3, or hilt experiment NAME, makes them; one of your own is named: hilt report FILE.toml"
         )));
     }
     let sections = shown.iter().map(|finished| section(finished, &context.interrupt)).collect::<Result<Vec<_>>>()?;

@@ -29,7 +29,7 @@ pub struct Args {
     #[arg(long, value_name = "FILE")]
     plans: Option<PathBuf>,
     /// Execute only the first N plans [default: all]
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = clap::value_parser!(u64).range(1..))]
     episodes: Option<u64>,
     /// Directory of recordings to write [default: runs/<TASK>/recordings]
     #[arg(long, value_name = "DIR")]

@@ -120,6 +120,9 @@ pub(super) fn put(table: &mut toml::Table, set: &str, origin: &str) -> Result<()
     if count > MOST_PARTS {
         return refuse(format!("a key of {count} parts; none has more than {MOST_PARTS} (`hilt settings` prints all keys)"));
     }
+    if key == TASK {
+        return refuse(format!("the task is no setting: --task {} chooses it", shown(value)));
+    }
     let parts: Vec<&str> = key.split('.').collect();
     if parts.len() < 2 && key != ROBOT || parts.iter().any(|p| p.is_empty()) {
         return refuse(format!("\"{}\" is not a key of the form stage.key{}", shown(key), check::hint(key)));

@@ -32,9 +32,9 @@ pub struct ProjectFile {
 }
 
 impl ProjectFile {
-    /// The nearest one: in `dir`, or in a directory above it.
+    /// The nearest one: in `dir`, or in a directory above it. A link that leads nowhere is one too, which cannot be read.
     pub fn above(dir: &Path) -> Option<PathBuf> {
-        dir.ancestors().map(|dir| dir.join(NAME)).find(|file| file.is_file())
+        dir.ancestors().map(|dir| dir.join(NAME)).find(|file| file.is_file() || file.is_symlink() && !file.exists())
     }
 
     /// That of the working directory.

@@ -23,10 +23,7 @@ impl ChosenTask {
         }
         let mut file = read_table(Path::new(said)).map_err(|why| why.to_string())?;
         match file.remove("task") {
-            Some(task @ toml::Value::Table(_)) => {
-                let task: Task = task.try_into().map_err(|why: toml::de::Error| format!("{said}: [task]: {}", why.message()))?;
-                Ok(ChosenTask(Arc::new(task)))
-            }
+            Some(task @ toml::Value::Table(_)) => of_table(task).map_err(|why| format!("{said}: [task]: {why}")),
             Some(toml::Value::String(name)) => built_in::find(&name).map(ChosenTask).map_err(|why| format!("{said}: {why}")),
             _ => Err(format!("{said} says no task: add [task] with objects and goals, or task = \"{}\"", built_in::names()[0])),
         }
@@ -42,6 +39,15 @@ impl ChosenTask {
         let text = serde_json::to_vec(&*self.0).expect("a task is plain data with text keys");
         blake3::hash(&text).to_hex().to_string()
     }
+}
+
+/// Of `[task]`; what is wrong with it is said with the key.
+fn of_table(task: toml::Value) -> Result<ChosenTask, String> {
+    let task: Result<Task, _> = serde_path_to_error::deserialize(task);
+    task.map(|task| ChosenTask(Arc::new(task))).map_err(|why| match why.path().to_string() {
+        key if key == "." => why.inner().message().into(),
+        key => format!("{key}: {}", why.inner().message()),
+    })
 }
 
 impl From<Arc<Task>> for ChosenTask {
@@ -69,7 +75,8 @@ impl<'de> Deserialize<'de> for ChosenTask {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         let task = match toml::Value::deserialize(deserializer)? {
             toml::Value::String(said) => ChosenTask::read(&said),
-            said => said.try_into().map(|task: Task| ChosenTask(Arc::new(task))).map_err(|why| why.message().into()),
+            said @ toml::Value::Table(_) => of_table(said),
+            _ => Err("expected a task's name or its file in quotes, or a table [task]".into()),
         };
         task.map_err(serde::de::Error::custom)
     }

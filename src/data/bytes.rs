@@ -118,6 +118,7 @@ pub(super) fn refuse_placeholder(path: &Path, head: &[u8]) -> Result<()> {
 /// [`Error::Io`] when it cannot be read.
 pub(super) fn head(path: &Path) -> Result<Vec<u8>> {
     let mut head = Vec::new();
+    let _waits = interrupt::waiting();
     let file = File::open(path).map_err(|e| Error::io(path, "read", e))?;
     file.take(HEAD_BYTES as u64).read_to_end(&mut head).map_err(|e| Error::io(path, "read", e))?;
     Ok(head)

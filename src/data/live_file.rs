@@ -3,6 +3,7 @@
 
 use super::bytes::Format;
 use crate::error::{Error, Result};
+use crate::interrupt;
 use crate::table::{Table, Values};
 use serde_json::{Map, Value, json};
 use std::collections::BTreeSet;
@@ -41,6 +42,7 @@ pub fn line<'a>(stage: &str, place: [u64; 2], updates: u64, values: impl Iterato
 
 /// Whether the first line of a file is one of these; an empty file is as good.
 pub fn is_ours(path: &Path) -> bool {
+    let _waits = interrupt::waiting();
     let Ok(file) = File::open(path) else { return false };
     let mut first = Vec::new();
     let read = BufReader::new(file.take(LONGEST_LINE)).read_until(b'\n', &mut first);

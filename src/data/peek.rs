@@ -4,6 +4,7 @@ use super::marked;
 use super::onnx::{EXPORT, PRODUCER};
 use super::provenance::KEY;
 use super::seal::find_last;
+use crate::interrupt;
 use prost::encoding::{WireType, decode_varint};
 use serde_json::Value;
 use std::fs::File;
@@ -31,6 +32,11 @@ const LONGEST_KEY: u64 = 20;
 const DOCTYPE: &[u8] = b"<!DOCTYPE html>";
 const GENERATOR: &[u8] = b"<meta name=\"generator\" content=\"hilt ";
 const PAGE_HEAD: u64 = 512;
+/// What a picture of hilt says in a comment near its beginning, after at most 256 colours.
+pub const PICTURE_MARK: &str = "by hilt ";
+/// The stage that such a picture is taken for.
+pub const PICTURE: &str = "picture";
+const PICTURE_HEAD: u64 = 2048;
 /// The stage comes within so many bytes after the version.
 const NEAR: usize = 64;
 
@@ -79,6 +85,7 @@ pub struct Peeked {
 /// # Errors
 /// What the system says when it cannot be read.
 pub fn peek(path: &Path) -> Result<Peeked> {
+    let _waits = interrupt::waiting();
     let mut file = File::open(path)?;
     let size = file.metadata()?.len();
     let head = part(&mut file, 0, HEAD)?;
@@ -90,6 +97,7 @@ pub fn peek(path: &Path) -> Result<Peeked> {
         Format::Safetensors => in_header(&mut file, size, &head)?,
         Format::Onnx => in_fields(&mut file, size, &head)?,
         Format::Html => in_page(&part(&mut file, 0, PAGE_HEAD)?),
+        Format::Png | Format::Gif => in_picture(&part(&mut file, 0, PICTURE_HEAD)?, format),
         Format::Json if size <= LONGEST_JSON => in_json(&part(&mut file, 0, size)?),
         _ => plain,
     })
@@ -120,6 +128,12 @@ fn in_page(head: &[u8]) -> Peeked {
         rest.iter().take_while(|b| b.is_ascii_lowercase()).map(|b| char::from(*b)).collect()
     });
     Peeked { format: Format::Html, stage, kind: None, whole: true }
+}
+
+/// Of a picture: whether it says that hilt has drawn it.
+fn in_picture(head: &[u8], format: Format) -> Peeked {
+    let stage = find_first(head, PICTURE_MARK.as_bytes()).map(|_| PICTURE.into());
+    Peeked { format, stage, kind: None, whole: true }
 }
 
 /// Of a table or a recording: the provenance's own text near the end.

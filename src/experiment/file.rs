@@ -7,10 +7,12 @@ use super::variation::{self, Raw as RawVariation};
 use super::wording::{check_keys, check_name, distinct, is_name, method_sets, not_empty, parsed, task_names};
 use crate::config::Preset;
 use crate::error::{Error, Result};
+use crate::interrupt;
 use crate::words::{shown, unknown};
 use serde::Deserialize;
 use std::collections::{BTreeMap, BTreeSet};
-use std::fs;
+use std::fs::{self, File};
+use std::io::Read;
 use std::path::{Path, PathBuf};
 
 /// Where the experiments that come with hilt are.
@@ -95,10 +97,13 @@ impl Experiment {
     /// [`Error::Io`] when it cannot be read; [`Error::Usage`] names what is wrong in it and what is allowed.
     pub fn read(path: &Path, overrides: &Overrides) -> Result<Self> {
         let io = |e| Error::io(path, "read", e);
-        if fs::metadata(path).map_err(io)?.len() > LONGEST_FILE {
+        let mut bytes = Vec::new();
+        let waits = interrupt::waiting();
+        File::open(path).map_err(io)?.take(LONGEST_FILE + 1).read_to_end(&mut bytes).map_err(io)?;
+        drop(waits);
+        if bytes.len() as u64 > LONGEST_FILE {
             return Err(Error::Usage(format!("{}: longer than {LONGEST_FILE} bytes: no experiment", path.display())));
         }
-        let bytes = fs::read(path).map_err(io)?;
         let text = String::from_utf8(bytes).map_err(|_| Error::Usage(format!("{}: not UTF-8 text", path.display())))?;
         Experiment::parse(path, &text, overrides)
     }

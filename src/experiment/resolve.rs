@@ -78,8 +78,9 @@ pub type Cell = [StageSettings; 6];
 /// [`Error::Usage`] names what is wrong and where.
 pub fn cells(experiment: &Experiment, task: &str, preset: &str, variation: Option<&Variation>) -> Result<Vec<Cell>> {
     let shared = cell(experiment, task, preset, variation, None)?;
-    let has_own =
-        |method| experiment.method_set.contains_key(method) || variation.is_some_and(|v| v.method_set.contains_key(method));
+    let has_own = |method: &MethodName| {
+        experiment.method_set.contains_key(method) || variation.is_some_and(|v| v.method_set.contains_key(method))
+    };
     let of = |method: &MethodName| {
         if has_own(method) { cell(experiment, task, preset, variation, Some(*method)) } else { Ok(shared.clone()) }
     };

@@ -8,7 +8,7 @@ const MOST_SEEDS: u64 = 10_000;
 
 /// Seeds as a file gives them.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
-#[serde(untagged)]
+#[serde(untagged, expecting = "expected a text such as \"0-4,9\", or a list such as [0, 1, 4]")]
 pub enum Seeds {
     /// One by one.
     List(Vec<u64>),

@@ -1,6 +1,7 @@
 //! Who may talk to a server.
 
 use crate::error::{Error, Result};
+use crate::interrupt;
 use std::fs;
 use std::net::{IpAddr, SocketAddr};
 use std::path::Path;
@@ -25,7 +26,9 @@ impl std::fmt::Debug for Token {
 /// # Errors
 /// [`Error::Io`] when it cannot be read; [`Error::Input`] when it holds no token.
 pub fn read_token(path: &Path) -> Result<String> {
+    let waits = interrupt::waiting();
     let text = fs::read_to_string(path).map_err(|e| Error::io(path, "read", e))?;
+    drop(waits);
     let token = text.trim();
     let graphic = token.bytes().all(|b| b.is_ascii_graphic());
     if !graphic || !(LEAST_TOKEN..=MOST_TOKEN).contains(&token.len()) {

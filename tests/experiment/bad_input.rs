@@ -6,11 +6,12 @@ use crate::sweep::{Sweep, TINY};
 fn a_wrong_file_is_refused_with_what_is_meant() {
     let variation = "[[variation]]\nname = \"plain\"\n";
     let again = "[[variation]]\nname = \"same\"\n\n[[variation]]\nname = \"plain\"\n";
-    let cases: [(&str, &str, &[&str]); 20] = [
+    let cases: [(&str, &str, &[&str]); 21] = [
         ("[\"hil\", \"bc\"]", "[\"hil\", \"bv\"]", &["unknown method \"bv\"; did you mean bc?"]),
         ("[\"pick-up\"]", "[\"pick_up\"]", &["unknown task \"pick_up\"; did you mean pick-up?"]),
         ("seeds =", "sedes =", &["unknown key \"sedes\"; did you mean seeds?"]),
         ("[11, 12]", "[]", &["seeds are empty"]),
+        ("[11, 12]", "0", &["seeds", "such as \"0-4,9\", or a list"]),
         ("[11, 12]", "[11, 11]", &["seed 11 is there twice"]),
         ("[11, 12]", "\"0-99999999\"", &["seeds 0-99999999 are more than"]),
         ("[11, 12]", "\"4-2\"", &["seeds 4-2", "lower end"]),

@@ -52,6 +52,10 @@ fn the_listed_commands_run_by_themselves_and_collect_to_the_same_results() {
 #[test]
 fn results_of_a_part_are_an_error_that_counts_what_is_missing() {
     let sweep = Sweep::new(TINY);
+    // Somebody's own table in the place of the results is known before the work.
+    std::fs::create_dir_all(sweep.at("mine")).expect("made");
+    std::fs::write(sweep.at("mine/results.csv"), "a,b\n").expect("written");
+    sweep.refuses(&["--dir", "mine"], &["results.csv", "was not made by hilt experiment"]);
     sweep.done(&["--seeds", "11"]);
     let output = sweep.run(&["--collect"]);
     assert_eq!(output.status.code(), Some(1));

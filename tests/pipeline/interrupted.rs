@@ -45,7 +45,11 @@ fn interrupted_by(name: &str, run: &Run, words: Vec<String>, wait: Duration) {
     }
     let output = child.wait_with_output().expect("ended");
     let stderr = text(&output.stderr);
-    assert_eq!(output.status.code(), Some(if name == "TERM" { 143 } else { 130 }), "{what}: {stderr}");
+    assert_eq!(
+        output.status.code(),
+        Some(128 + [("HUP", 1), ("INT", 2), ("TERM", 15)].iter().find(|(of, _)| *of == name).expect("known").1),
+        "{what}: {stderr}"
+    );
     assert!(stderr.contains("error: interrupted; no artefact was changed"), "{what}: {stderr}");
     assert!(output.stdout.is_empty(), "{what} printed a result");
     if what.contains("\"train\"") {
@@ -84,6 +88,63 @@ fn planning_learning_and_evaluation_stop() {
         interrupted_by("INT", &run, words, SOON);
     }
     interrupted_by("TERM", &run, long(&run, "plan", &["--episodes", "100000"]), SOON);
+    // A terminal that is gone: training leaves its checkpoint as well.
+    interrupted_by("HUP", &run, long(&run, "train", &["--set", "train.warm_start_updates=10000000"]), SOON);
+}
+
+#[test]
+fn nohup_keeps_its_meaning() {
+    let run = Run::finished();
+    let words = long(&run, "plan", &["--episodes", "100000"]);
+    let mut child =
+        Command::new("nohup").arg(HILT).args(words).stdout(Stdio::null()).stderr(Stdio::null()).spawn().expect("runs");
+    std::thread::sleep(SOON);
+    signal(&child, "HUP");
+    std::thread::sleep(SOON);
+    assert!(child.try_wait().expect("waits").is_none(), "a hang-up ended it");
+    signal(&child, "INT");
+    assert_eq!(child.wait().expect("ended").code(), Some(130));
+}
+
+#[test]
+fn waiting_for_a_pipe_stops() {
+    let dir = tempfile::tempdir().expect("temporary directory");
+    let pipe = |name: &str| {
+        let path = dir.path().join(name).display().to_string();
+        assert!(Command::new("mkfifo").arg(&path).status().expect("mkfifo runs").success());
+        path
+    };
+    for words in [
+        ["robot", "draft", &pipe("a.urdf")],
+        ["robot", "check", &pipe("b.toml")],
+        ["experiment", "--dry-run", &pipe("c.toml")],
+        ["plot", "--watch", &pipe("d.jsonl")],
+    ] {
+        let mut child = start(words.map(String::from).to_vec());
+        std::thread::sleep(SOON);
+        signal(&child, "TERM");
+        let sent = Instant::now();
+        while child.try_wait().expect("waits").is_none() && sent.elapsed() < PATIENCE {
+            std::thread::sleep(Duration::from_millis(5));
+        }
+        let ended = child.try_wait().expect("waits");
+        child.kill().expect("killed");
+        assert!(ended.is_some(), "{words:?} did not stop");
+    }
+}
+
+#[test]
+fn watching_waits_for_the_first_epoch() {
+    let dir = tempfile::tempdir().expect("temporary directory");
+    let live = dir.path().join("policy.training.jsonl");
+    fs::write(&live, "").expect("written");
+    let mut child = start(["plot", "--watch", live.to_str().expect("UTF-8")].map(String::from).to_vec());
+    std::thread::sleep(2 * SOON);
+    assert!(child.try_wait().expect("waits").is_none(), "it did not wait");
+    signal(&child, "INT");
+    let output = child.wait_with_output().expect("ended");
+    assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
+    assert!(text(&output.stderr).contains("plot: waits for a training"), "{}", text(&output.stderr));
 }
 
 #[test]

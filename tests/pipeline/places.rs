@@ -74,6 +74,19 @@ fn an_output_that_holds_another_artefact_is_refused() {
     ] {
         refused_as_usage(&run, words, &[says, "would be lost"]);
     }
+    // A half of what convert has split is not hilt dataset's to replace, nor is what that has made convert's.
+    let [dataset, train, half] = ["dataset", "dataset/train", "dataset/validation"].map(|name| run.name(name));
+    let filter = words(&["dataset", "filter", &train, "--success", "--out", &half]);
+    refused_as_usage(&run, filter, &["a dataset of hilt convert", "would be lost"]);
+    let [merged, split] = ["merged", "split"].map(|name| run.name(name));
+    done(&hilt(words(&["dataset", "merge", &train, &half, "--out", &merged])));
+    let before = contents(run.path());
+    let output = hilt(with(&run, "pretrain", "--dataset", &merged));
+    run.refused("one dataset", &output, &before, &["is one dataset", "hilt dataset split"]);
+    done(&hilt(words(&["dataset", "split", &merged, "--out", &split])));
+    refused_as_usage(&run, with(&run, "convert", "--out", &split), &["a dataset of hilt dataset", "would be lost"]);
+    done(&hilt(words(&["dataset", "split", &merged, "--out", &split])));
+    assert!(run.at(&dataset).is_dir());
     // What was cut short is made again.
     let plans = fs::read(run.at("plans.parquet")).expect("plans");
     for damaged in [&plans[..plans.len() / 2], b""] {
@@ -81,6 +94,37 @@ fn an_output_that_holds_another_artefact_is_refused() {
         done(&hilt(run.words("plan")));
         assert_eq!(fs::read(run.at("plans.parquet")).expect("plans"), plans);
     }
+}
+
+#[test]
+fn pictures_and_logs_of_somebody_else_stay() {
+    let run = Run::finished();
+    let recording = run.name("recordings/episode-00000.mcap");
+    let of_others: [(&str, &[u8]); 3] =
+        [("mine.gif", b"GIF89a mine"), ("mine.png", b"\x89PNG\r\n\x1a\n mine"), ("mine.log", b"Monday, with tea\n")];
+    for (name, bytes) in of_others {
+        fs::write(run.at(name), bytes).expect("written");
+    }
+    let render = |name: &str| words(&["render", &recording, "--width", "64", "--height", "48", "--out", &run.name(name)]);
+    for (of, says) in [
+        (render("mine.gif"), "a file that hilt did not write"),
+        (render("mine.png"), "a file that hilt did not write"),
+        (words(&["inspect", &recording, "--log", &run.name("mine.log")]), "is there already"),
+    ] {
+        refused_as_usage(&run, of, &[says, "would be lost"]);
+    }
+    for name in ["own.gif", "own.png"] {
+        done(&hilt(render(name)));
+        done(&hilt(render(name)));
+    }
+    // A log is of the last command, with the reason for which that failed.
+    let log = run.name("own.log");
+    done(&hilt(with(&run, "plan", "--log", &log)));
+    let output = hilt(words(&["inspect", "nowhere.parquet", "--log", &log]));
+    assert_eq!(output.status.code(), Some(1));
+    let said = fs::read_to_string(&log).expect("a log");
+    assert!(said.starts_with("error: nowhere.parquet"), "{said}");
+    done(&hilt(with(&run, "plan", "--log", &log)));
 }
 
 #[test]
@@ -117,6 +161,13 @@ fn what_goes_beside_an_output_has_its_name() {
 fn devices_and_pipes_are_written_into_and_links_and_permissions_stay() {
     let run = Run::finished();
     done(&hilt(with(&run, "train", "--metrics", "/dev/null")));
+    assert!(fs::metadata("/dev/null").expect("there").file_type().is_char_device(), "/dev/null was replaced");
+
+    // Nothing goes beside a device.
+    done(&hilt(with(&run, "evaluate", "--out", "/dev/null")));
+    done(&hilt(with(&run, "train", "--out", "/dev/null")));
+    let beside = |entry: &fs::DirEntry| entry.file_name().to_string_lossy().starts_with("null.");
+    assert!(!fs::read_dir("/dev").expect("readable").flatten().any(|entry| beside(&entry)));
     assert!(fs::metadata("/dev/null").expect("there").file_type().is_char_device(), "/dev/null was replaced");
 
     let output = hilt(with(&run, "plan", "--out", "/dev/stdout"));

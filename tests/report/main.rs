@@ -157,6 +157,11 @@ fn a_part_is_shown_as_a_part_and_nothing_is_refused() {
     let said = place.done(&["report", "tiny.toml", "--seeds", "11,99", "--out", "page"]);
     assert!(said.contains("3 of 3 runs"), "{said}");
     place.refused(&["report", "tiny.toml", "--seeds", "99", "--out", "page"], 2, "tiny has none of them");
+    // A page of somebody's own has the same names.
+    fs::create_dir_all(place.at("mine/figures")).expect("made");
+    fs::write(place.at("mine/index.html"), "<!DOCTYPE html><title>Me</title>").expect("written");
+    place.refused(&["report", "tiny.toml", "--out", "mine"], 2, "no index.html of hilt report");
+    place.refused(&["report"], 1, "one of your own is named");
     // What is not a report's is not lost, nor is an older report when the next one cannot be made.
     fs::write(place.at("page/thesis.tex"), "years of work").expect("written");
     place.refused(&["report", "tiny.toml", "--out", "page"], 1, "thesis.tex");

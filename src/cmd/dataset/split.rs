@@ -1,5 +1,5 @@
 use super::common::open;
-use crate::cmd::places::{Content, Places};
+use crate::cmd::places::{Content, EDITED, Places};
 use crate::cmd::{Context, Outcome};
 use crate::data::dataset::edit::{self, Part, Plan};
 use crate::data::dataset::{TRAIN, VALIDATION, split};
@@ -26,7 +26,7 @@ pub struct Args {
 }
 
 pub fn run(args: &Args, context: &Context) -> Result<Outcome> {
-    Places::new().read(&args.dataset).write("--out", &args.out, Content::Datasets).check(&context.console)?;
+    Places::new().read(&args.dataset).write("--out", &args.out, Content::Datasets(EDITED)).check(&context.console)?;
     let input = open(&args.dataset)?;
     let count = input.episodes();
     if count < 2 {

@@ -17,7 +17,7 @@ pub struct Args {
     #[arg(long, value_name = "SEEDS", value_parser = parse_seeds)]
     pub seeds: Option<Chosen>,
     /// Episodes of each evaluation instead of the file's
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = clap::value_parser!(u64).range(1..))]
     pub episodes: Option<u64>,
     /// Steps side by side, among which the threads are divided [default: one for each two threads]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]

@@ -36,6 +36,9 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome> {
     check_given(&checked.grid)?;
     leftovers::check(&checked.dir, &checked.grid)?;
     let runs = !(args.instead.dry_run || args.instead.list.is_some() || args.instead.emit.is_some() || args.instead.collect);
+    if runs {
+        output::check_tables(&checked.dir)?;
+    }
     // Taken before the look at what is done: steps that a killed run has left may still be at work.
     let lock = if runs { Some(lock::Lock::take(&checked.dir, context)?) } else { None };
     let contents = survey(&checked.grid)?;

@@ -68,11 +68,19 @@ pub fn collect(checked: &Checked, contents: &Contents, context: &Context) -> Res
     Err(Error::Failed(format!("{missing} of {runs} runs are not finished; hilt experiment {name} goes on with them")))
 }
 
+/// Refuses, before any work, files of somebody's own where the tables of results and of wall times go.
+///
+/// # Errors
+/// [`Error::Input`] names the file.
+pub fn check_tables(dir: &Path) -> Result<()> {
+    refuse_foreign(&dir.join(RESULTS), "task,preset,variation,")?;
+    refuse_foreign(&dir.join(TIMES), "step,stage,task,")
+}
+
 /// Writes the tables of results and of wall times.
 pub fn write<'a>(checked: &'a Checked, contents: &Contents) -> Result<Vec<Row<'a>>> {
+    check_tables(&checked.dir)?;
     let (results, times) = (checked.dir.join(RESULTS), checked.dir.join(TIMES));
-    refuse_foreign(&results, "task,preset,variation,")?;
-    refuse_foreign(&times, "step,stage,task,")?;
     let rows = results::rows(&checked.grid, contents)?;
     let (table, wall) = (results::to_csv(&rows, &checked.grid), results::times_csv(&checked.grid, contents));
     atomic::write_all(&[(times, wall.into_bytes()), (results, table.into_bytes())])?;

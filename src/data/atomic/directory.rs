@@ -25,8 +25,12 @@ pub fn write_dir(path: &Path, ours: impl Fn(&Path) -> bool, fill: impl FnOnce(&P
     let fresh = temporary::directory(parent, path)?;
     fill(fresh.dir.path()).map_err(|e| in_words_of(e, fresh.dir.path(), path))?;
     sync_all_below(fresh.dir.path()).map_err(|e| Error::io(path, "write", e))?;
-    if place.in_place { move_in(fresh, &place.path) } else { exchange(fresh, &place) }
-        .map_err(|e| Error::io(path, "rename", e))?;
+    if place.in_place { move_in(fresh, &place.path) } else { exchange(fresh, &place) }.map_err(|e| match e.kind() {
+        ErrorKind::DirectoryNotEmpty => {
+            Error::input(path, "another process has put a directory there meanwhile, which stays; run the command again")
+        }
+        _ => Error::io(path, "rename", e),
+    })?;
     sync_directory(parent);
     Ok(())
 }

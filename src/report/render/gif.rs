@@ -1,11 +1,11 @@
 //! Animated pictures of an episode.
 
 use super::colors::{Palette, UNCHANGED};
-use super::{Renderer, RgbImage, check_size, font, label, step_at};
+use super::{Renderer, RgbImage, check_size, font, label, mark, step_at};
 use crate::demo::Episode;
 use crate::error::{Error, Result};
 use crate::interrupt::Interrupt;
-use gif::{DisposalMethod, Encoder, EncodingError, Frame, Repeat};
+use gif::{DisposalMethod, Encoder, EncodingError, Extension, Frame, Repeat};
 use std::io::Write;
 
 /// How long the last picture stays before the animation starts again \[1/100 s\].
@@ -50,6 +50,7 @@ pub fn write_gif<W: Write>(episode: &Episode, options: &GifOptions, interrupt: &
     let mut palette = Palette::new();
     let mut encoder = Encoder::new(out, options.width as u16, options.height as u16, &palette.bytes()).map_err(failed)?;
     encoder.set_repeat(Repeat::Infinite).map_err(failed)?;
+    encoder.write_raw_extension(Extension::Comment.into(), &[mark().as_bytes()]).map_err(failed)?;
     let mut renderer = Renderer::new(&episode.scene, (options.width, options.height));
     let delay = (100.0 / f64::from(options.fps)).round() as u16;
     let last = episode.steps.len();

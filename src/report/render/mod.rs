@@ -17,6 +17,7 @@ pub use self::robot::robot_png;
 pub(in crate::report) use sheet::write_png;
 pub use sheet::write_png_sheet;
 
+use crate::data::peek::PICTURE_MARK;
 use crate::demo::{Body, Episode, Step};
 use crate::error::{Error, Result};
 use crate::robot::Robot;
@@ -40,6 +41,11 @@ const TOP_LAYER_M: f64 = 0.001;
 const TAG_TABLE: u8 = 1;
 /// Smallest and largest picture edge that writers accept \[pixels\].
 const EDGE_PX: [u32; 2] = [16, 4096];
+
+/// What a picture says of who drew it: such a one may be replaced by another, somebody's own not.
+fn mark() -> String {
+    format!("{PICTURE_MARK}{}", env!("CARGO_PKG_VERSION"))
+}
 
 /// A picture, three bytes (red, green, blue) a pixel, row by row from the top.
 #[derive(Clone, Debug, PartialEq, Eq)]

@@ -1,6 +1,6 @@
 //! Contact sheets: evenly spaced pictures of an episode in one PNG file.
 
-use super::{Renderer, RgbImage, check_size, font, label, step_at};
+use super::{Renderer, RgbImage, check_size, font, label, mark, step_at};
 use crate::demo::Episode;
 use crate::error::{Error, Result};
 use crate::interrupt::Interrupt;
@@ -72,6 +72,7 @@ pub(in crate::report) fn write_png<W: Write>(image: &RgbImage, out: W) -> std::r
     let mut encoder = png::Encoder::new(out, image.width, image.height);
     encoder.set_color(png::ColorType::Rgb);
     encoder.set_depth(png::BitDepth::Eight);
+    encoder.add_text_chunk("Software".into(), mark())?;
     let mut writer = encoder.write_header()?;
     writer.write_image_data(&image.data)?;
     writer.finish()

@@ -38,7 +38,8 @@ impl Stamp {
         if any(&mut self.files.iter().map(|(file, _)| file), time(&self.begun), true) {
             return Some("it was stopped while it was put in place");
         }
-        any(&mut before.iter(), time(&self.path), false).then_some("what it was made from was changed by hand since")
+        any(&mut before.iter(), time(&self.path), false)
+            .then_some("what it was made from is newer: changed by hand since, or copied without its times")
     }
 
     /// Whether the files have the sizes that make left them with.

@@ -58,7 +58,7 @@ impl<'a> Assembly<'a> {
                 (kind, _) => {
                     let kind = shown(kind);
                     return Err(format!(
-                        "line {}, joint \"{name}\": type \"{kind}\"; allowed: revolute, continuous, prismatic, fixed",
+                        "line {} of the URDF, joint \"{name}\": type \"{kind}\"; allowed: revolute, continuous, prismatic, fixed",
                         joint.line
                     ));
                 }
@@ -83,7 +83,7 @@ impl<'a> Assembly<'a> {
         let (name, slides) = (shown(&joint.name), joint.kind == "prismatic");
         let axis = Vector3::from(joint.axis);
         if axis.norm() < ALIGNED_RAD.sqrt() {
-            return Err(format!("line {}, joint \"{name}\": its axis is no direction: {:?}", joint.line, joint.axis));
+            return Err(format!("line {} of the URDF, joint \"{name}\": its axis is no direction: {:?}", joint.line, joint.axis));
         }
         if let Some(held) = self.description.fixed.get(&joint.name) {
             let axis = nalgebra::Unit::new_normalize(axis);
@@ -98,7 +98,7 @@ impl<'a> Assembly<'a> {
         let Some(place) = place else {
             let mimics = joint.mimics.as_ref().map(|other| format!(" (it mimics \"{}\")", shown(other))).unwrap_or_default();
             return Err(format!(
-                "line {}, joint \"{name}\" moves{mimics}, but is neither under arm nor under fingers: name it there, or hold it under [fixed]",
+                "line {} of the URDF, joint \"{name}\" moves{mimics}, but is neither under arm nor under fingers: name it there, or hold it under [fixed]",
                 joint.line
             ));
         };

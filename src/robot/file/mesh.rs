@@ -1,5 +1,6 @@
 //! The box around a mesh.
 
+use crate::interrupt;
 use std::fs::File;
 use std::io::BufReader;
 use std::path::Path;
@@ -18,6 +19,7 @@ pub fn bounds_of_stl(path: &Path, scale: [f64; 3]) -> Result<([f64; 3], [f64; 3]
         return Err(format!("{shown}: hilt reads meshes in STL; convert it, or give [shapes]"));
     }
     let unreadable = |why: std::io::Error| format!("{shown}: {why}");
+    let _waits = interrupt::waiting();
     let file = File::open(path).map_err(unreadable)?;
     if file.metadata().map_err(unreadable)?.len() > LARGEST_FILE {
         return Err(format!("{shown}: larger than {LARGEST_FILE} bytes; give [shapes]"));

@@ -10,12 +10,13 @@ mod read_urdf;
 mod tree;
 
 use crate::error::{Error, Result};
-use crate::interrupt::Interrupt;
+use crate::interrupt::{self, Interrupt};
 use crate::words::shown;
 use assemble::assemble;
 use description::{Description, Read};
 use std::collections::BTreeMap;
-use std::fs;
+use std::fs::File;
+use std::io::Read as _;
 use std::path::{Path, PathBuf, absolute};
 
 /// Reads a robot from its TOML file and the URDF that it names.
@@ -44,10 +45,14 @@ pub fn draft(urdf: &Path, interrupt: &Interrupt) -> Result<String> {
 
 fn text_of(path: &Path) -> Result<String> {
     let io = |e| Error::io(path, "read", e);
-    if fs::metadata(path).map_err(io)?.len() > read_urdf::LONGEST_FILE {
+    let mut bytes = Vec::new();
+    let waits = interrupt::waiting();
+    File::open(path).map_err(io)?.take(read_urdf::LONGEST_FILE + 1).read_to_end(&mut bytes).map_err(io)?;
+    drop(waits);
+    if bytes.len() as u64 > read_urdf::LONGEST_FILE {
         return Err(Error::input(path, format!("longer than {} bytes: no description of a robot", read_urdf::LONGEST_FILE)));
     }
-    String::from_utf8(fs::read(path).map_err(io)?).map_err(|_| Error::input(path, "not UTF-8 text"))
+    String::from_utf8(bytes).map_err(|_| Error::input(path, "not UTF-8 text"))
 }
 
 /// Absolute, so that packages are found in any directory above it.

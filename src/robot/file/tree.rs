@@ -21,23 +21,27 @@ pub fn foot(urdf: &Urdf) -> Result<&str, String> {
     }
     let mut names = BTreeSet::new();
     if let Some(twice) = urdf.links.iter().find(|link| !names.insert(link.name.as_str())) {
-        return Err(format!("line {}: two links are called \"{}\"", twice.line, shown(&twice.name)));
+        return Err(format!("line {} of the URDF: two links are called \"{}\"", twice.line, shown(&twice.name)));
     }
     let (mut joints, mut parents) = (BTreeSet::new(), BTreeMap::new());
     for joint in &urdf.joints {
         let name = shown(&joint.name);
         if !joints.insert(joint.name.as_str()) {
-            return Err(format!("line {}: two joints are called \"{name}\"", joint.line));
+            return Err(format!("line {} of the URDF: two joints are called \"{name}\"", joint.line));
         }
         if let Some(unknown) = [&joint.parent, &joint.child].into_iter().find(|link| !names.contains(link.as_str())) {
             let known: Vec<&str> = names.iter().copied().collect();
             let hint = did_you_mean(unknown, known);
-            return Err(format!("line {}, joint \"{name}\": there is no link \"{}\"{hint}", joint.line, shown(unknown)));
+            return Err(format!(
+                "line {} of the URDF, joint \"{name}\": there is no link \"{}\"{hint}",
+                joint.line,
+                shown(unknown)
+            ));
         }
         if let Some(other) = parents.insert(joint.child.as_str(), joint) {
             let (link, other) = (shown(&joint.child), shown(&other.name));
             return Err(format!(
-                "line {}: link \"{link}\" hangs on two joints, \"{other}\" and \"{name}\": a robot is a tree",
+                "line {} of the URDF: link \"{link}\" hangs on two joints, \"{other}\" and \"{name}\": a robot is a tree",
                 joint.line
             ));
         }
@@ -65,8 +69,25 @@ pub fn foot(urdf: &Urdf) -> Result<&str, String> {
     });
     match looping {
         None => Ok(root),
-        Some(link) => Err(format!("line {}: link \"{}\" hangs on itself: its joints make a loop", link.line, shown(&link.name))),
+        Some(link) => {
+            Err(format!("line {} of the URDF: link \"{}\" hangs on itself: its joints make a loop", link.line, shown(&link.name)))
+        }
     }
+}
+
+/// Longest name of a robot.
+const LONGEST_NAME: usize = 64;
+
+/// A robot's name is that of a directory of its runs.
+fn check_own_name(name: &str) -> Result<(), String> {
+    let letters = name.bytes().all(|b| b.is_ascii_alphanumeric() || b"._-".contains(&b));
+    if letters && name.starts_with(|c: char| c.is_ascii_alphanumeric()) && name.len() <= LONGEST_NAME {
+        return Ok(());
+    }
+    Err(format!(
+        "name = \"{}\" is no name of a directory: up to {LONGEST_NAME} letters, digits, dots, - and _, a letter or digit first",
+        shown(name)
+    ))
 }
 
 /// Every joint and link that the description names is there, and is named once.
@@ -74,6 +95,7 @@ pub fn foot(urdf: &Urdf) -> Result<&str, String> {
 /// # Errors
 /// Names the key, and what is allowed.
 pub fn check_names(description: &Description, urdf: &Urdf) -> Result<(), String> {
+    check_own_name(&description.name)?;
     let joints: Vec<&str> = urdf.joints.iter().map(|joint| joint.name.as_str()).collect();
     let links: Vec<&str> = urdf.links.iter().map(|link| link.name.as_str()).collect();
     let known = |key: &str, what: &str, name: &str, all: &[&str]| match all.contains(&name) {

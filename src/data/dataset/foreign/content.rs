@@ -5,6 +5,7 @@ use crate::data::ContentHash;
 use crate::data::dataset::meta::{DATA, TASKS};
 use crate::data::parquet_stream::Stream;
 use crate::error::{Error, Result};
+use crate::interrupt;
 use std::fs::File;
 use std::path::{Path, PathBuf};
 
@@ -23,6 +24,7 @@ pub(in crate::data::dataset) fn content(root: &Root) -> Result<ContentHash> {
 
 fn hash(path: &Path) -> Result<ContentHash> {
     let mut hash = blake3::Hasher::new();
+    let _waits = interrupt::waiting();
     File::open(path).and_then(|file| hash.update_reader(file).map(drop)).map_err(|e| Error::io(path, "read", e))?;
     Ok(ContentHash(hash.finalize()))
 }

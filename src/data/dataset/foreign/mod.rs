@@ -75,9 +75,15 @@ pub fn is_foreign(dir: &Path) -> bool {
     })
 }
 
-/// Whether a directory is or holds a dataset that hilt did not write.
-pub fn is_others(dir: &Path) -> bool {
-    descriptions(dir).any(|value| value.get(provenance::KEY).is_none())
+/// What a directory is or holds that `stage` of hilt did not write: a dataset of another program, or of another stage.
+pub fn of_others(dir: &Path, stage: &str) -> Option<String> {
+    descriptions(dir).find_map(|value| {
+        let Some(hilt) = value.get(provenance::KEY) else {
+            return Some("a dataset that hilt did not write".into());
+        };
+        let made_by = hilt["provenance"]["stage"].as_str()?;
+        (made_by != stage).then(|| format!("a dataset of hilt {made_by}"))
+    })
 }
 
 /// The descriptions of the dataset in a directory, or of the two in it, as far as they can be read.
