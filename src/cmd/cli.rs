@@ -83,34 +83,43 @@ impl Cli {
             .map_err(|e| Error::Failed(format!("cannot start worker threads: {e}; try --threads 1")))?;
         let goes_on = matches!(&self.command, Command::Train(args) if args.resume);
         let context = Context { console: Console::new(self.quiet, self.log.as_deref(), goes_on), interrupt };
+        let outcome = self.dispatch(&context);
+        if let Err(why) = &outcome {
+            context.console.log_error(why);
+        }
+        outcome
+    }
+
+    /// Runs the command; one that works, and does not only answer, says how long it took.
+    fn dispatch(&self, context: &Context) -> Result<Outcome> {
         let started = Instant::now();
         let outcome = match &self.command {
-            Command::Plan(args) => plan::run(args, &context),
-            Command::Simulate(args) => simulate::run(args, &context),
-            Command::Convert(args) => convert::run(args, &context),
-            Command::Pretrain(args) => pretrain::run(args, &context),
-            Command::Train(args) => train::run(args, &context),
-            Command::Evaluate(args) => evaluate::run(args, &context),
-            Command::Experiment(args) => experiment::run(args, &context),
-            Command::Report(args) => report::run(args, &context),
-            Command::Export(args) if export::only_answers(args) => return export::run(args, &context),
-            Command::Export(args) => export::run(args, &context),
-            Command::Dataset(args) if dataset::only_answers(args) => return dataset::run(args, &context),
-            Command::Dataset(args) => dataset::run(args, &context),
-            Command::Serve(args) => serve::run(args, &context),
-            Command::ServeEnv(args) => serve_env::run(args, &context),
-            Command::Inspect(args) => return inspect::run(args, &context),
-            Command::Runs(args) => return runs::run(args, &context),
-            Command::Compare(args) => return compare::run(args, &context),
-            Command::Plot(args) => return plot::run(args, &context),
-            Command::View(args) => view::run(args, &context),
-            Command::Render(args) => render::run(args, &context),
-            Command::Replay(args) => replay::run(args, &context),
-            Command::Robot(args) => return robot::run(args, &context),
-            Command::Settings(args) => return settings::run(args, &context),
-            Command::Doctor(args) => return doctor::run(args, &context),
-            Command::Completions(args) => return completions::run(args, Cli::command(), &context),
-            Command::Man(args) => return man::run(args, Cli::command(), &context),
+            Command::Plan(args) => plan::run(args, context),
+            Command::Simulate(args) => simulate::run(args, context),
+            Command::Convert(args) => convert::run(args, context),
+            Command::Pretrain(args) => pretrain::run(args, context),
+            Command::Train(args) => train::run(args, context),
+            Command::Evaluate(args) => evaluate::run(args, context),
+            Command::Experiment(args) => experiment::run(args, context),
+            Command::Report(args) => report::run(args, context),
+            Command::Export(args) if export::only_answers(args) => return export::run(args, context),
+            Command::Export(args) => export::run(args, context),
+            Command::Dataset(args) if dataset::only_answers(args) => return dataset::run(args, context),
+            Command::Dataset(args) => dataset::run(args, context),
+            Command::Serve(args) => serve::run(args, context),
+            Command::ServeEnv(args) => serve_env::run(args, context),
+            Command::Inspect(args) => return inspect::run(args, context),
+            Command::Runs(args) => return runs::run(args, context),
+            Command::Compare(args) => return compare::run(args, context),
+            Command::Plot(args) => return plot::run(args, context),
+            Command::View(args) => view::run(args, context),
+            Command::Render(args) => render::run(args, context),
+            Command::Replay(args) => replay::run(args, context),
+            Command::Robot(args) => return robot::run(args, context),
+            Command::Settings(args) => return settings::run(args, context),
+            Command::Doctor(args) => return doctor::run(args, context),
+            Command::Completions(args) => return completions::run(args, Cli::command(), context),
+            Command::Man(args) => return man::run(args, Cli::command(), context),
         };
         if outcome.is_ok() {
             context.console.say(&format!("processor time {:.1} s", processor_s()));
@@ -118,10 +127,6 @@ impl Cli {
         }
         match outcome {
             Ok(Outcome::Dropped(_)) if self.allow_dropped => Ok(Outcome::Done),
-            Err(why) => {
-                context.console.log_error(&why);
-                Err(why)
-            }
             other => other,
         }
     }

@@ -65,6 +65,9 @@ impl Places {
                 Content::Dataset => atomic::check_directory(path, dataset::is_root_file)?,
                 Content::Report => atomic::check_directory(path, experiments::is_file)?,
                 Content::Events => atomic::check_directory(path, tensorboard::is_file)?,
+                Content::Pieces if path.is_file() => {
+                    return Err(Error::input(path, "is a file, and what is finished is kept there until all is; move it away"));
+                }
                 Content::Pieces => atomic::check_place(&path.join("a piece"))?,
                 _ => atomic::check_place(path)?,
             }

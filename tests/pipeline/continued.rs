@@ -218,7 +218,7 @@ fn shares_that_cannot_be_are_refused() {
         run.words("plan").into_iter().map(|w| if w == run.name("plans.parquet") { "/dev/stdout".into() } else { w }).collect();
     run.refuses(to_pipe.into_iter().chain(["--shard", "1/2"].map(String::from)).collect(), &["--shard 1/2", "/dev/stdout"]);
     fs::write(run.at("plans.unfinished"), "years of work").expect("written");
-    run.refuses(run.words("plan"), &["plans.unfinished", "Not a directory"]);
+    run.refuses(run.words("plan"), &["plans.unfinished: is a file", "move it away"]);
 }
 
 #[test]

@@ -21,7 +21,14 @@ const MANY: usize = 4000;
 const DISTINCT: u64 = 200;
 
 pub fn start(words: Vec<String>) -> Child {
-    Command::new(HILT).args(words).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().expect("the binary runs")
+    // Tests that run under nohup hand on that a hang-up is ignored.
+    Command::new("env")
+        .args(["--default-signal=HUP", HILT])
+        .args(words)
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .expect("the binary runs")
 }
 
 pub fn signal(child: &Child, name: &str) {

@@ -74,6 +74,10 @@ fn an_output_that_holds_another_artefact_is_refused() {
     ] {
         refused_as_usage(&run, words, &[says, "would be lost"]);
     }
+    fs::write(run.at("x.unfinished"), "mine").expect("written");
+    let before = contents(run.path());
+    let output = hilt(with(&run, "plan", "--out", &run.name("x.parquet")));
+    run.refused("a file in the pieces' place", &output, &before, &["x.unfinished: is a file"]);
     // A half of what convert has split is not hilt dataset's to replace, nor is what that has made convert's.
     let [dataset, train, half] = ["dataset", "dataset/train", "dataset/validation"].map(|name| run.name(name));
     let filter = words(&["dataset", "filter", &train, "--success", "--out", &half]);

@@ -146,7 +146,7 @@ fn every_form_of_a_report_is_whole_and_the_same_each_time() {
 fn a_part_is_shown_as_a_part_and_nothing_is_refused() {
     let place = Place::new();
     place.refused(&["report", "tiny.toml"], 1, "no run of tiny is finished; hilt experiment tiny.toml makes them");
-    place.refused(&["report"], 1, "no run of any experiment is finished");
+    place.refused(&["report"], 1, "no run of an experiment that comes with hilt is finished");
     place.refused(&["report", "tinny"], 2, "no experiment \"tinny\"");
     place.done(&["experiment", "tiny.toml", "--seeds", "11"]);
     place.refused(&["report", "tiny.toml", "tiny.toml"], 2, "tiny: is named twice");

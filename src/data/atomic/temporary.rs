@@ -6,6 +6,7 @@
 
 use crate::error::{Error, Result};
 use std::fs::{self, File, Permissions, TryLockError};
+use std::io;
 use std::os::unix::fs::PermissionsExt;
 use std::path::Path;
 use std::thread::sleep;
@@ -34,10 +35,16 @@ pub fn is_temporary(name: &str) -> bool {
 /// A new file in `dir`, locked; an error speaks of `path`, which it is for.
 pub(super) fn file(dir: &Path, path: &Path) -> Result<NamedTempFile> {
     let _creating = lock_shared(dir);
-    let made = builder(FILE_MODE).tempfile_in(dir).map_err(|e| Error::io(path, "create", e))?;
+    let made = builder(FILE_MODE).tempfile_in(dir).map_err(|e| Error::io(path, "create", unnamed(&e)))?;
     // Without locks nobody removes anything.
     let _ = made.as_file().try_lock();
     Ok(made)
+}
+
+/// An error without the temporary name that it speaks of, which nobody has given.
+fn unnamed(error: &io::Error) -> io::Error {
+    let words = error.to_string();
+    io::Error::new(error.kind(), words.split(" at path \"").next().unwrap_or_default())
 }
 
 /// A directory under a temporary name, locked as long as this value lives.
@@ -49,7 +56,7 @@ pub(super) struct Directory {
 /// A new directory in `parent`; an error speaks of `path`, which it is for.
 pub(super) fn directory(parent: &Path, path: &Path) -> Result<Directory> {
     let _creating = lock_shared(parent);
-    let dir = builder(DIRECTORY_MODE).tempdir_in(parent).map_err(|e| Error::io(path, "create", e))?;
+    let dir = builder(DIRECTORY_MODE).tempdir_in(parent).map_err(|e| Error::io(path, "create", unnamed(&e)))?;
     let lock = File::open(dir.path()).ok().filter(|handle| handle.try_lock().is_ok());
     Ok(Directory { dir, _lock: lock })
 }
