@@ -1,6 +1,9 @@
 //! Ctrl-C as a value: long loops ask it between items and stop with [`Error::Interrupted`].
 
 use crate::error::{Error, Result};
+use std::fs::File;
+use std::io::Read;
+use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicI32, AtomicUsize, Ordering};
 
@@ -42,6 +45,17 @@ pub struct Waiting(());
 pub fn waiting() -> Waiting {
     WAITING.fetch_add(1, Ordering::SeqCst);
     Waiting(())
+}
+
+/// The bytes of what stands at `path`, a pipe too: at most `most`, and one more where there are more. It may be waited for, see [`waiting`].
+///
+/// # Errors
+/// What the system says when it cannot be read.
+pub fn read_at_most(path: &Path, most: u64) -> std::io::Result<Vec<u8>> {
+    let _waits = waiting();
+    let mut bytes = Vec::new();
+    File::open(path)?.take(most + 1).read_to_end(&mut bytes)?;
+    Ok(bytes)
 }
 
 impl Drop for Waiting {

@@ -3,8 +3,8 @@ use super::{Context, Outcome, output};
 use crate::data::atomic;
 use crate::error::{Error, Result};
 use crate::report::curves::{
-    Plot, Style, columns, draw, draw_errors, errors_picture, holds_model_errors, is_pretraining, latest, live_of, model_errors,
-    picture, plots, sources,
+    LIVE, Plot, Style, columns, draw, draw_errors, errors_picture, holds_model_errors, is_pretraining, latest, live_of,
+    model_errors, picture, plots, sources,
 };
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -102,8 +102,8 @@ fn watch(args: &Args, context: &Context) -> Result<Outcome> {
     let [of] = args.of.as_slice() else {
         return Err(Error::Usage("--watch follows one training: name one run, or one file of hilt train --live".into()));
     };
-    if !of.is_dir() && !ENDS.iter().any(|end| of.as_os_str().as_encoded_bytes().ends_with(end.as_bytes())) {
-        let (of, known) = (of.display(), ENDS.join(" nor in "));
+    if !of.is_dir() && !LIVE.iter().any(|end| of.as_os_str().as_encoded_bytes().ends_with(end.as_bytes())) {
+        let (of, known) = (of.display(), LIVE.join(" nor in "));
         context
             .console
             .say(&format!("plot: {of} ends neither in {known}: the end of its training is not seen; Ctrl-C ends this"));
@@ -144,9 +144,6 @@ fn watch(args: &Args, context: &Context) -> Result<Outcome> {
     }
     Ok(Outcome::Done)
 }
-
-/// Endings of the files that are beside the table that their training ends with.
-const ENDS: [&str; 2] = [".training.jsonl", ".pretraining.jsonl"];
 
 /// Whether something is written: a file begins empty.
 fn has_begun(live: &Path) -> bool {

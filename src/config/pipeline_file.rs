@@ -4,8 +4,6 @@ use super::robot::is_file;
 use crate::error::{Error, Result};
 use crate::interrupt;
 use crate::words::shown;
-use std::fs::File;
-use std::io::Read;
 use std::path::Path;
 
 /// A pipeline file with every key is 4 kB long; this leaves room for comments and boxes \[bytes\].
@@ -49,11 +47,7 @@ pub(super) fn parsed(text: &str, origin: &str) -> Result<toml::Table> {
 
 /// Whatever stands at `path`, a pipe too, is read up to a limit.
 fn read(path: &Path) -> Result<String> {
-    let io = |e| Error::io(path, "read", e);
-    let mut bytes = Vec::new();
-    let waits = interrupt::waiting();
-    File::open(path).map_err(io)?.take(LONGEST_FILE + 1).read_to_end(&mut bytes).map_err(io)?;
-    drop(waits);
+    let bytes = interrupt::read_at_most(path, LONGEST_FILE).map_err(|e| Error::io(path, "read", e))?;
     let refuse = |why: String| Error::Usage(format!("{} is not a pipeline file: {why}", path.display()));
     if bytes.len() as u64 > LONGEST_FILE {
         return Err(refuse(format!("it is longer than {LONGEST_FILE} bytes")));

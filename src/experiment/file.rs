@@ -11,8 +11,7 @@ use crate::interrupt;
 use crate::words::{shown, unknown};
 use serde::Deserialize;
 use std::collections::{BTreeMap, BTreeSet};
-use std::fs::{self, File};
-use std::io::Read;
+use std::fs;
 use std::path::{Path, PathBuf};
 
 /// Where the experiments that come with hilt are.
@@ -96,11 +95,7 @@ impl Experiment {
     /// # Errors
     /// [`Error::Io`] when it cannot be read; [`Error::Usage`] names what is wrong in it and what is allowed.
     pub fn read(path: &Path, overrides: &Overrides) -> Result<Self> {
-        let io = |e| Error::io(path, "read", e);
-        let mut bytes = Vec::new();
-        let waits = interrupt::waiting();
-        File::open(path).map_err(io)?.take(LONGEST_FILE + 1).read_to_end(&mut bytes).map_err(io)?;
-        drop(waits);
+        let bytes = interrupt::read_at_most(path, LONGEST_FILE).map_err(|e| Error::io(path, "read", e))?;
         if bytes.len() as u64 > LONGEST_FILE {
             return Err(Error::Usage(format!("{}: longer than {LONGEST_FILE} bytes: no experiment", path.display())));
         }

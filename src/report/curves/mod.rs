@@ -11,5 +11,5 @@ pub use latest::latest;
 pub use model::{Curve, Plot, plots};
 pub use model_error::{ModelErrors, draw_errors, errors_picture, holds_model_errors, model_errors};
 pub use picture::picture;
-pub use sources::{Source, is_pretraining, live_of, sources};
+pub use sources::{LIVE, Source, is_pretraining, live_of, sources};
 pub use terminal::{Style, columns, draw};

@@ -11,7 +11,7 @@ use std::path::{Path, PathBuf};
 /// Endings of the tables of metrics that stages write.
 const TABLES: [&str; 2] = [".training.parquet", ".pretraining.parquet"];
 /// Endings of the same metrics as they come.
-const LIVE: [&str; 2] = [".training.jsonl", ".pretraining.jsonl"];
+pub const LIVE: [&str; 2] = [".training.jsonl", ".pretraining.jsonl"];
 /// Of which the second is of the dynamics network.
 const PRETRAINING: usize = 1;
 /// Columns that say where training stood.

@@ -15,8 +15,6 @@ use crate::words::shown;
 use assemble::assemble;
 use description::{Description, Read};
 use std::collections::BTreeMap;
-use std::fs::File;
-use std::io::Read as _;
 use std::path::{Path, PathBuf, absolute};
 
 /// Reads a robot from its TOML file and the URDF that it names.
@@ -44,11 +42,7 @@ pub fn draft(urdf: &Path, interrupt: &Interrupt) -> Result<String> {
 }
 
 fn text_of(path: &Path) -> Result<String> {
-    let io = |e| Error::io(path, "read", e);
-    let mut bytes = Vec::new();
-    let waits = interrupt::waiting();
-    File::open(path).map_err(io)?.take(read_urdf::LONGEST_FILE + 1).read_to_end(&mut bytes).map_err(io)?;
-    drop(waits);
+    let bytes = interrupt::read_at_most(path, read_urdf::LONGEST_FILE).map_err(|e| Error::io(path, "read", e))?;
     if bytes.len() as u64 > read_urdf::LONGEST_FILE {
         return Err(Error::input(path, format!("longer than {} bytes: no description of a robot", read_urdf::LONGEST_FILE)));
     }
