@@ -123,7 +123,7 @@ POLICY     := $(DIR)/policy$(OF).safetensors
 EVALUATION := $(DIR)/evaluation$(OF).json
 ARTEFACTS  := $(PLANS) $(RECORDINGS) $(DATASET) $(DYNAMICS) $(POLICY) $(EVALUATION)
 
-.PHONY: all stages smoke experiment table2 table3 figures report test cluster-test check transfer meta-world interop report-test view-test qemu bench fuzz help clean-runs build install need-cargo FORCE $(ARTEFACTS)
+.PHONY: all stages smoke experiment table2 table3 figure7 figures report test cluster-test check transfer meta-world interop report-test view-test qemu bench fuzz help clean-runs build install need-cargo FORCE $(ARTEFACTS)
 
 all: $(EVALUATION) ## run every stage of TASK; writes RUNS/TASK/policy.safetensors and RUNS/TASK/evaluation.json
 	@$(MADE) result
@@ -201,16 +201,18 @@ table3: $(HILT) ## the paper's Table 3 (hours)
 table2 table3:
 	$(call EXPERIMENT,$@)
 
-OTHER_EXPERIMENTS := $(filter-out table2 table3 smoke,$(EXPERIMENTS))
+OTHER_EXPERIMENTS := $(filter-out table2 table3 smoke figure7,$(EXPERIMENTS))
 .PHONY: $(OTHER_EXPERIMENTS)
 $(OTHER_EXPERIMENTS): $(HILT)
 	$(call EXPERIMENT,$@)
 
-figures: $(HILT) ## the runs behind the paper's figures 6, 7 and 8
-	$(call EXPERIMENT,figure6)
+# One figure of the paper: imitation without a warm start and with one, and reinforcement learning.
+figure7: $(HILT)
 	$(call EXPERIMENT,figure7)
+	$(call EXPERIMENT,figure7-warm)
 	$(call EXPERIMENT,figure7-rl)
-	$(call EXPERIMENT,figure8)
+
+figures: figure6 figure7 figure8 ## the runs behind the paper's figures 6, 7 and 8
 
 report: $(HILT) ## a page of the experiments that have finished runs: RUNS/report/index.html
 	$(HILT) report --runs $(RUNS)/experiments --out $(RUNS)/report --threads $(THREADS) $(call optional,seeds,SEEDS) $(call optional,episodes,EPISODES)
@@ -268,6 +270,7 @@ cluster-test: build ## a tiny experiment through Snakemake and through Slurm on 
 	tests/cluster/run.sh $(HILT)
 
 transfer: ## the policy of TASK on DeepMind's Jaco in MuJoCo, EPISODES of them (500): RUNS/TASK/transfer (needs Python 3.11; docs/transfer.md)
+	@:$(if $(EPISODES),$(call number,EPISODES))
 	@:$(if $(filter-out $(PAPER_TASKS),$(TASK))$(filter-out jaco,$(ROBOT)),$(error make transfer knows the tasks $(PAPER_TASKS) on the jaco, not TASK=$(TASK) ROBOT=$(ROBOT)))
 	@$(MAKE) --no-print-directory all
 	python/transfer/run.sh $(HILT) $(POLICY) $(EVALUATION:.json=.episodes.parquet) $(DIR)/transfer$(OF) $(or $(EPISODES),500) $(call word-of,$(basename $(notdir $(PIPELINE)))$(OF))

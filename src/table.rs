@@ -1,5 +1,27 @@
 //! A typed table with names, units and words: what metrics, plans and evaluation logs are before they become files.
 
+/// Endings of column names and their units; the longest that fits counts.
+const UNITS: [(&str, &str); 13] = [
+    ("_rad_s2", "rad/s^2"),
+    ("_rad_s", "rad/s"),
+    ("_m_s2", "m/s^2"),
+    ("_m_s", "m/s"),
+    ("_n_m", "N m"),
+    ("_rad", "rad"),
+    ("_deg", "deg"),
+    ("_kg", "kg"),
+    ("_hz", "Hz"),
+    ("_ms", "ms"),
+    ("_n", "N"),
+    ("_m", "m"),
+    ("_s", "s"),
+];
+
+/// The unit that a column's name carries (`speed_m_s` is in m/s).
+pub fn unit_of(name: &str) -> Option<&'static str> {
+    UNITS.iter().find(|(ending, _)| name.ends_with(ending)).map(|(_, unit)| *unit)
+}
+
 /// The values of one column.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Values {

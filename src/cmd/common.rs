@@ -17,7 +17,7 @@ pub const RUNS: &str = "runs";
 /// Which settings: a preset of a task or a pipeline file, then `--set`, then flags of the stage.
 #[derive(Debug, clap::Args)]
 pub struct SettingsArgs {
-    /// Task: pick-up, pick-and-place, stack, or the TOML file of another [default: that of the artefact that is read]
+    /// Task: pick-up, pick-and-place, stack, tower, sort, bin, or the TOML file of another [default: that of the artefact that is read]
     #[arg(long, value_name = "NAME|FILE.toml")]
     task: Option<String>,
     /// Robot: jaco, panda, ur5e, or the TOML file of another [default: that of the artefact or the pipeline, jaco]

@@ -7,7 +7,6 @@ use crate::error::{Error, Result};
 use crate::interrupt;
 use std::ffi::OsStr;
 use std::fs;
-use std::io::Read;
 use std::path::{Path, PathBuf};
 
 /// What is written to a place.
@@ -149,7 +148,7 @@ pub(super) fn check_held(name: &str, path: &Path, content: Content) -> Result<()
 fn check_text(name: &str, path: &Path, content: Content) -> Result<()> {
     let empty = fs::metadata(path).is_ok_and(|found| found.len() == 0);
     let ours = || match content {
-        Content::Svg => fs::read(path).is_ok_and(|bytes| bytes.trim_ascii_start().starts_with(b"<svg")),
+        Content::Svg => is_chart(path),
         Content::Live => live_file::is_ours(path),
         Content::Log => begins_as_a_log(path),
         _ => false,
@@ -161,14 +160,24 @@ fn check_text(name: &str, path: &Path, content: Content) -> Result<()> {
     Err(Error::Usage(format!("{name} {path}: is there already, and would be lost; move it away or choose another name")))
 }
 
+/// Whether a file begins as a chart of hilt does; other programs begin theirs otherwise.
+fn is_chart(path: &Path) -> bool {
+    let head = interrupt::read_at_most(path, LONGEST_TAG).unwrap_or_default();
+    let head = String::from_utf8_lossy(&head);
+    let tag = head.split_once('>').map_or("", |(tag, _)| tag);
+    tag.starts_with("<svg ") && CHART.iter().all(|part| tag.contains(part))
+}
+
+/// What the first tag of a chart says, and how long it is at most.
+const CHART: [&str; 2] = ["role=\"img\"", "aria-label"];
+const LONGEST_TAG: u64 = 4096;
+
 /// Whether the first line of a file is one of a log: `train: ...`, or a time.
 fn begins_as_a_log(path: &Path) -> bool {
-    let mut head = Vec::new();
-    let _waits = interrupt::waiting();
-    let read = fs::File::open(path).and_then(|file| file.take(LONGEST_STAGE).read_to_end(&mut head));
+    let head = interrupt::read_at_most(path, LONGEST_STAGE).unwrap_or_default();
     let text = String::from_utf8_lossy(&head);
     let is_stage = |word: &str| !word.is_empty() && word.bytes().all(|b| b.is_ascii_lowercase() || b == b'-');
-    read.is_ok() && (text.split_once(": ").is_some_and(|(stage, _)| is_stage(stage)) || text.starts_with("processor time "))
+    text.split_once(": ").is_some_and(|(stage, _)| is_stage(stage)) || text.starts_with("processor time ")
 }
 
 /// Longest name of a stage or task that a log's line begins with.

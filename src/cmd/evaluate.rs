@@ -76,7 +76,6 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome> {
         None => run_all(&rollouts, &subject, context, |_| Ok(()))?,
         Some(dir) => record_all(dir, &rollouts, &subject, context, &provenance)?,
     };
-    write_atlas(args, context)?;
     let summary = Summary::of(&pipeline.task, &trials);
     let stated = Stated::new(&summary, &foreign);
     if let (Some(out), Some(log)) = (&args.out, log) {
@@ -84,6 +83,8 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome> {
         let table = table_file::encode(&log, &to_table(&pipeline.task, &trials), &provenance)?;
         atomic::write_all(&[(log, table), (out.clone(), json_file::encode(out, &value, &provenance)?)])?;
     }
+    // What can fail comes after what took so long.
+    write_atlas(args, context)?;
     if args.json {
         output::print_json(&stated)?
     } else {

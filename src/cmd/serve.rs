@@ -1,4 +1,4 @@
-use super::fits::made_by;
+use super::fits::{made_by, robot_of};
 use super::listen::ListenArgs;
 use super::places::Places;
 use super::{Context, Outcome, evaluate, train};
@@ -8,7 +8,7 @@ use crate::error::{Error, Result};
 use crate::learn::Policy;
 use crate::serve::{PolicyHost, PolicyOptions};
 use crate::tasks::with_layout;
-use serde_json::{Map, Value, json};
+use serde_json::{Map, json};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
@@ -93,9 +93,7 @@ fn robot(args: &Args, policy: &Policy, made: &Provenance) -> Result<Option<Chose
             }
         };
     }
-    let Value::String(theirs) = made.settings["robot"].get("name").cloned().unwrap_or_else(|| "jaco".into()) else {
-        return Err(Error::input(&args.policy, "says no name of its robot"));
-    };
+    let theirs = robot_of(made);
     let said = args.robot.as_deref().unwrap_or(&theirs);
     let advice =
         format!("{}: was made by robot {theirs}; give --robot with its TOML file, for its limits", args.policy.display());

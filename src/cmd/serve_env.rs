@@ -1,7 +1,7 @@
 use super::common::SettingsArgs;
 use super::listen::ListenArgs;
 use super::{Context, Outcome};
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::serve::WorldHost;
 
 /// Serve the simulated task as an environment for programs of others: the episodes of an evaluation, step by step, over a WebSocket.
@@ -21,7 +21,15 @@ pub struct Args {
     listen: ListenArgs,
 }
 
+/// The largest seed that clients are told of.
+const LARGEST_SEED: u64 = i64::MAX as u64;
+
 pub fn run(args: &Args, context: &Context) -> Result<Outcome> {
+    if args.settings.seed > LARGEST_SEED {
+        let what =
+            format!("--seed {}; allowed: at most {LARGEST_SEED}, as the protocol's whole numbers are signed", args.settings.seed);
+        return Err(Error::Usage(what));
+    }
     let horizon = ("evaluate.horizon_steps", args.horizon.map(|steps| steps.to_string()));
     let pipeline = args.settings.resolve(&[horizon])?;
     args.settings.places(&context.console).read_all(args.listen.reads()).check(&context.console)?;

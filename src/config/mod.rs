@@ -35,7 +35,7 @@ pub use preset::Preset;
 pub use pretrain::PretrainSettings;
 pub use project::ProjectFile;
 pub use randomise::RandomiseSettings;
-pub use ranges::{MOST_LAYERS, MOST_STEPS, MOST_UNITS};
+pub use ranges::{MOST_HORIZON_STEPS, MOST_LAYERS, MOST_STEPS, MOST_UNITS};
 pub use robot::{ChosenRobot, is_file};
 pub use sc::ScSettings;
 pub use scene::{FingerPulses, PlanSettings, PulseSettings, SceneSettings, SimulateSettings, check_scene};

@@ -38,6 +38,8 @@ const MOST_EPISODES: f64 = 100_000.0;
 pub(super) const MOST_OBSTACLES: usize = 100;
 /// Most control steps of an episode, and samples of a plan: 500 s. Keeps a slip of the finger from allocating all memory.
 pub const MOST_STEPS: u32 = 10_000;
+/// Most control steps of an episode that a policy acts in: twice those of the longest demo.
+pub const MOST_HORIZON_STEPS: u32 = 2 * MOST_STEPS;
 const STEPS: f64 = MOST_STEPS as f64;
 /// Longest delay of a command \[control steps\]: a second. No arm that takes longer is driven by joint velocities.
 const LONGEST_DELAY_STEPS: f64 = 20.0;

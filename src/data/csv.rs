@@ -89,35 +89,32 @@ fn frames(root: &Path, lines: &mut Lines) -> Result<()> {
     if !root.join("meta").is_dir() && root.join(dataset::TRAIN).is_dir() {
         return Err(Error::input(root, format!("holds two datasets; name one: {}", root.join(dataset::TRAIN).display())));
     }
-    let (mut failed, mut number) = (Ok(()), 0);
+    let mut number = 0;
     dataset::each(root, |episode| {
-        if failed.is_ok() {
-            failed = (|| {
-                let demo: &Demo = &episode.demo;
-                if number == 0 {
-                    let first = ["episode", "source_episode", "step", "time_s"].map(String::from);
-                    let last = ["reward", "success"].map(String::from);
-                    lines.line(first.into_iter().chain(entries(demo.layout())).chain(last))?;
-                }
-                (0..=demo.len()).try_for_each(|t| {
-                    let at_end = t == demo.len();
-                    let mut cells = vec![number.to_string(), episode.source_index.to_string(), t.to_string(), seconds(t)];
-                    cells.extend(demo.state(t).iter().map(f32::to_string));
-                    let actions = [demo.actions(), demo.executed()].map(|all| all.len() / demo.len());
-                    if at_end {
-                        cells.extend(vec![String::new(); actions.iter().sum()]);
-                    } else {
-                        cells.extend(demo.action(t).iter().chain(demo.executed_action(t)).map(f32::to_string));
-                    }
-                    cells.push(episode.rewards.get(t).map_or(String::new(), f32::to_string));
-                    cells.push((at_end && episode.success).to_string());
-                    lines.line(cells)
-                })
-            })();
+        let demo: &Demo = &episode.demo;
+        if number == 0 {
+            let first = ["episode", "source_episode", "step", "time_s"].map(String::from);
+            let last = ["reward", "success"].map(String::from);
+            lines.line(first.into_iter().chain(entries(demo.layout())).chain(last))?;
+        }
+        for t in 0..=demo.len() {
+            let at_end = t == demo.len();
+            let mut cells = vec![number.to_string(), episode.source_index.to_string(), t.to_string(), seconds(t)];
+            cells.extend(demo.state(t).iter().map(f32::to_string));
+            let actions = [demo.actions(), demo.executed()].map(|all| all.len() / demo.len());
+            if at_end {
+                cells.extend(vec![String::new(); actions.iter().sum()]);
+            } else {
+                cells.extend(demo.action(t).iter().chain(demo.executed_action(t)).map(f32::to_string));
+            }
+            cells.push(episode.rewards.get(t).map_or(String::new(), f32::to_string));
+            cells.push((at_end && episode.success).to_string());
+            lines.line(cells)?;
         }
         number += 1;
+        Ok(())
     })?;
-    failed
+    Ok(())
 }
 
 fn steps(path: &Path, lines: &mut Lines) -> Result<()> {

@@ -24,6 +24,8 @@ use std::sync::Arc;
 
 /// Who wrote the file, in Parquet's own "application version x" form.
 const CREATED_BY: &str = concat!("hilt version ", env!("CARGO_PKG_VERSION"));
+/// The same of any version.
+const BY_HILT: &[u8] = b"hilt version ";
 /// Metadata key of the seal.
 const SEAL_KEY: &str = "hilt.seal";
 
@@ -128,7 +130,7 @@ pub(super) fn is_foreign(bytes: &[u8]) -> bool {
 }
 
 pub(super) fn ends_as_foreign(bytes: &[u8]) -> bool {
-    seal::find_last(&bytes[bytes.len().saturating_sub(WRITER_WITHIN)..], CREATED_BY.as_bytes()).is_none()
+    seal::find_last(&bytes[bytes.len().saturating_sub(WRITER_WITHIN)..], BY_HILT).is_none()
 }
 
 pub(super) fn foreign(path: &Path) -> Error {

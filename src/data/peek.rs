@@ -1,9 +1,9 @@
 //! What a file is that stands where another is to be written: told from its head and its tail, without reading it whole.
 
-use super::marked;
 use super::onnx::{EXPORT, PRODUCER};
 use super::provenance::KEY;
 use super::seal::find_last;
+use super::{json_text, marked};
 use crate::interrupt;
 use prost::encoding::{WireType, decode_varint};
 use serde_json::Value;
@@ -152,9 +152,9 @@ fn in_tail(file: &mut File, size: u64, magic: &[u8], format: Format) -> Result<P
 fn in_header(file: &mut File, size: u64, head: &[u8]) -> Result<Peeked> {
     let length = head.first_chunk().map_or(0, |bytes| u64::from_le_bytes(*bytes));
     let header = part(file, LENGTH, length.min(REACH * LENGTH))?;
-    let header: Option<Value> = serde_json::from_slice(&header).ok();
+    let header: Option<Value> = json_text::parse(&header).ok();
     let text = header.as_ref().and_then(|h| h["__metadata__"][KEY].as_str());
-    let hilt: Value = text.and_then(|text| serde_json::from_str(text).ok()).unwrap_or_default();
+    let hilt: Value = text.and_then(|text| json_text::parse(text.as_bytes()).ok()).unwrap_or_default();
     let word = |value: &Value| value.as_str().map(String::from);
     Ok(Peeked {
         format: Format::Safetensors,
@@ -191,7 +191,7 @@ fn field_end(bytes: &[u8]) -> Option<u64> {
 }
 
 fn in_json(text: &[u8]) -> Peeked {
-    let content: Option<Value> = serde_json::from_slice(text).ok();
+    let content: Option<Value> = json_text::parse(text).ok();
     let stage = content.as_ref().and_then(|c| c[KEY]["provenance"]["stage"].as_str()).map(String::from);
     Peeked { format: Format::Json, stage, kind: None, whole: content.is_some() }
 }

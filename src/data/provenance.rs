@@ -1,6 +1,7 @@
 //! Where an artefact came from. The same inputs give the same words: no times, no machine, no absolute paths.
 
 use super::content_hash::ContentHash;
+use super::json_text;
 use super::seal::{self, SCHEMA_VERSION};
 use crate::error::{Error, Result};
 use crate::words::shown;
@@ -66,7 +67,8 @@ impl Provenance {
     /// # Errors
     /// [`Error::Input`] for another schema version and for JSON that is no provenance.
     pub fn from_json(path: &Path, json: &str) -> Result<Self> {
-        let value = serde_json::from_str(json).map_err(|e| Error::input(path, format!("its provenance is no JSON: {e}")))?;
+        let value =
+            json_text::parse(json.as_bytes()).map_err(|e| Error::input(path, format!("its provenance is no JSON: {e}")))?;
         Provenance::from_value(path, value)
     }
 

@@ -3,7 +3,7 @@
 use super::parquet_stream::Stream;
 use super::{ContentHash, Provenance, atomic, parquet_file};
 use crate::error::{Error, Result};
-use crate::table::{Column, Table, Values};
+use crate::table::{Column, Table, Values, unit_of};
 use arrow_array::cast::AsArray;
 use arrow_array::types::{Float32Type, Float64Type, Int64Type};
 use arrow_array::{
@@ -17,28 +17,6 @@ use std::sync::Arc;
 const DOC: &str = "doc";
 /// Field metadata: its unit.
 const UNIT: &str = "unit";
-
-/// Endings of column names and their units; the longest that fits counts.
-const UNITS: [(&str, &str); 13] = [
-    ("_rad_s2", "rad/s^2"),
-    ("_rad_s", "rad/s"),
-    ("_m_s2", "m/s^2"),
-    ("_m_s", "m/s"),
-    ("_n_m", "N m"),
-    ("_rad", "rad"),
-    ("_deg", "deg"),
-    ("_kg", "kg"),
-    ("_hz", "Hz"),
-    ("_ms", "ms"),
-    ("_n", "N"),
-    ("_m", "m"),
-    ("_s", "s"),
-];
-
-/// The unit that a column's name carries (`speed_m_s` is in m/s).
-pub fn unit_of(name: &str) -> Option<&'static str> {
-    UNITS.iter().find(|(ending, _)| name.ends_with(ending)).map(|(_, unit)| *unit)
-}
 
 /// Writes a table. NaN is kept; a reader that cannot use it says so.
 ///

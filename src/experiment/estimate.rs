@@ -89,11 +89,14 @@ fn seconds_of(log: &Path, what: &str) -> Option<f64> {
     last.strip_suffix(" s")?.parse().ok()
 }
 
+/// Steps whose times are alike: of one stage, task and method.
+type Kind = (&'static str, String, Option<&'static str>);
+
 /// Wall times of steps, `threads` each.
 pub struct Estimate {
     threads: f64,
-    /// Measured over stated wall time, by stage and task.
-    ratios: BTreeMap<(&'static str, String), f64>,
+    /// Measured over stated wall time, by stage, task and method.
+    ratios: BTreeMap<Kind, f64>,
 }
 
 impl Estimate {
@@ -132,8 +135,8 @@ impl Estimate {
     }
 }
 
-fn key(step: &Step) -> (&'static str, String) {
-    (step.stage.name(), step.task.clone())
+fn key(step: &Step) -> Kind {
+    (step.stage.name(), step.task.clone(), step.method.map(MethodName::name))
 }
 
 /// A time in words: `40 s`, `12 min`, `3.5 h`.

@@ -69,9 +69,9 @@ pub struct Span {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Holds {
-    /// State: the angle of each joint that an action drives, in their order \[rad\].
+    /// State: the position of each joint that an action drives, in their order \[rad; m of one that slides\].
     JointPositions,
-    /// State: their velocities \[rad/s\].
+    /// State: their velocities \[rad/s, m/s\].
     JointVelocities,
     /// State: the pose of an object that may move.
     Pose,
@@ -81,9 +81,9 @@ pub enum Holds {
     FixedPose,
     /// State, the same throughout an episode: a point.
     FixedPoint,
-    /// Action: velocities of the arm's joints \[rad/s\].
+    /// Action: velocities of the arm's joints \[rad/s, m/s\].
     ArmVelocities,
-    /// Action: velocities of the fingers \[rad/s\].
+    /// Action: velocities of the fingers \[rad/s, m/s\].
     FingerVelocities,
     /// Action: numbers of which nothing is known.
     Commands,

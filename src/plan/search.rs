@@ -10,7 +10,7 @@ use rand::{Rng, RngExt};
 
 /// Length of a step of the trees \[m\].
 const STEP_M: f64 = 0.04;
-/// Room that the search may use around the two ends: x, y \[m\].
+/// Room that the search may use, and as far as the two ends lie: x, y \[m\].
 const REACH_XY_M: [[f64; 2]; 2] = [[0.20, 0.70], [-0.45, 0.45]];
 /// Greatest height of the tool point in a search \[m\].
 const REACH_Z_M: f64 = 0.45;
@@ -39,13 +39,16 @@ impl Search<'_> {
     /// Knots of a free path between two ends, each with its joint angles; `None` when the iterations are spent, or on an interrupt.
     pub(super) fn connect(&mut self, from: (Knot, Joints), to: (Knot, Joints), rng: &mut impl Rng) -> Option<Vec<Knot>> {
         let mut trees = [from, to].map(|(knot, q)| vec![Node { knot, q, parent: 0 }]);
+        let reach = |[low, high]: [f64; 2], a: f64, b: f64| [low.min(a).min(b), high.max(a).max(b)];
+        let x = reach(REACH_XY_M[0], from.0.x, to.0.x);
+        let y = reach(REACH_XY_M[1], from.0.y, to.0.y);
         let low_z = from.0.z.min(to.0.z);
+        let z = [low_z, REACH_Z_M.max(from.0.z).max(to.0.z)];
         for round in 0..self.iterations {
             self.interrupt.check().ok()?;
             let (grown, other) = (round % 2, 1 - round % 2);
             let mut within = |[low, high]: [f64; 2]| low + (high - low) * rng.random::<f64>();
-            let goal =
-                Knot::new(within(REACH_XY_M[0]), within(REACH_XY_M[1]), within([low_z, REACH_Z_M]), within([from.0.w, to.0.w]));
+            let goal = Knot::new(within(x), within(y), within(z), within([from.0.w, to.0.w]));
             let start = nearest(&trees[grown], &goal);
             let Some(node) = self.step(&trees[grown], start, &goal) else { continue };
             trees[grown].push(node);

@@ -33,7 +33,7 @@ pub fn to_table(robot: &Robot, plans: &[Plan]) -> Table {
         .with("phase", "Part of the plan.", Values::Text(rows().map(|(.., w)| w.phase.name().into()).collect()));
     for (j, joint) in robot.joints.iter().enumerate() {
         let position = Values::F64(rows().map(|(.., w)| w.q[j]).collect());
-        table = table.with(&joint.position_name(), "Joint angle.", position);
+        table = table.with(&joint.position_name(), "Joint position.", position);
     }
     for (j, joint) in robot.joints.iter().enumerate() {
         let velocity = Values::F64(rows().map(|(.., w)| w.dq[j]).collect());

@@ -2,7 +2,6 @@
 
 use crate::error::{Error, Result};
 use crate::interrupt;
-use std::fs;
 use std::net::{IpAddr, SocketAddr};
 use std::path::Path;
 
@@ -10,6 +9,9 @@ use std::path::Path;
 const LEAST_TOKEN: usize = 16;
 /// A longer one would not fit into a handshake.
 const MOST_TOKEN: usize = 1024;
+
+/// More than a file with one holds.
+const MOST_FILE_BYTES: u64 = 2 * MOST_TOKEN as u64;
 
 /// A secret that clients must know. Only its hash is kept.
 #[derive(Clone, Copy)]
@@ -26,9 +28,8 @@ impl std::fmt::Debug for Token {
 /// # Errors
 /// [`Error::Io`] when it cannot be read; [`Error::Input`] when it holds no token.
 pub fn read_token(path: &Path) -> Result<String> {
-    let waits = interrupt::waiting();
-    let text = fs::read_to_string(path).map_err(|e| Error::io(path, "read", e))?;
-    drop(waits);
+    let text = interrupt::read_at_most(path, MOST_FILE_BYTES).map_err(|e| Error::io(path, "read", e))?;
+    let text = String::from_utf8_lossy(&text);
     let token = text.trim();
     let graphic = token.bytes().all(|b| b.is_ascii_graphic());
     if !graphic || !(LEAST_TOKEN..=MOST_TOKEN).contains(&token.len()) {
@@ -106,7 +107,7 @@ mod tests {
             ("0123456789 abcdef", false),
             ("0123456789abcdef\nmore", false),
         ] {
-            fs::write(&path, text).expect("written");
+            std::fs::write(&path, text).expect("written");
             assert_eq!(read_token(&path).is_ok(), good, "{text:?}");
         }
         assert!(read_token(&dir.path().join("none")).is_err());

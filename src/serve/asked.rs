@@ -1,8 +1,9 @@
 //! What a client asks of a world.
 
 use super::link::Message;
-use super::rows::{MOST_HORIZON_STEPS, Rows};
+use super::rows::Rows;
 use super::value::Value;
+use crate::config::MOST_HORIZON_STEPS;
 
 /// What episodes are for.
 pub const SPLITS: [&str; 2] = ["evaluation", "training"];

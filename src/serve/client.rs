@@ -2,8 +2,9 @@
 
 use super::dial::{Address, Dial};
 use super::msgpack;
-use super::rows::{EPISODE, FRAME, MOST_HORIZON_STEPS, Rows};
+use super::rows::{EPISODE, FRAME, Rows};
 use super::value::Value;
+use crate::config::MOST_HORIZON_STEPS;
 use crate::error::{Error, Result};
 use crate::interrupt::Interrupt;
 use crate::layout::Layout;

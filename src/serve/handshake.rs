@@ -15,12 +15,14 @@ const MOST_HEADERS: usize = 64;
 const MOST_TIME: Duration = Duration::from_secs(5);
 /// How long a caller that is turned away may take to ask and to hear it: all others wait so long.
 const TURN_AWAY_TIME: Duration = Duration::from_millis(5);
+/// Said to who is turned away.
+const NO_ROOM: &str = "503 Service Unavailable";
 /// The end of a request's head.
 const END: &[u8] = b"\r\n\r\n";
 
-/// Answers the request that opens a connection. With a WebSocket agreed on, the bytes that came behind the request; otherwise it is answered in
-/// full and there is nothing more to say.
-pub fn shake(stream: &mut Paced, token: Option<&Token>) -> Option<Vec<u8>> {
+/// Answers the request that opens a connection. With a WebSocket agreed on, the bytes that came behind the request and a place, which only
+/// who may come in takes; otherwise it is answered in full and there is nothing more to say.
+pub fn shake<S>(stream: &mut Paced, token: Option<&Token>, take: impl FnOnce() -> Option<S>) -> Option<(Vec<u8>, S)> {
     let (head, rest) = read_head(stream)?;
     stream.whole();
     match judge(&head, token) {
@@ -29,11 +31,15 @@ pub fn shake(stream: &mut Paced, token: Option<&Token>) -> Option<Vec<u8>> {
             None
         }
         Ok(Asked::Socket(key)) => {
+            let Some(seat) = take() else {
+                answer(stream, NO_ROOM, "", "all connections are taken; try again later\n");
+                return None;
+            };
             let response = format!(
                 "HTTP/1.1 101 Switching Protocols\r\nConnection: Upgrade\r\nUpgrade: websocket\r\nSec-WebSocket-Accept: {}\r\n\r\n",
                 derive_accept_key(key.as_bytes())
             );
-            stream.write_all(response.as_bytes()).ok().map(|()| rest)
+            stream.write_all(response.as_bytes()).ok().map(|()| (rest, seat))
         }
         Err(Refused { status, header, why }) => {
             answer(stream, status, header, &format!("{why}\n"));
@@ -47,7 +53,7 @@ pub fn turn_away(stream: &mut TcpStream, why: &str) {
     let waits = stream.set_nonblocking(false).and_then(|()| stream.set_read_timeout(Some(TURN_AWAY_TIME)));
     // A caller that does not listen is not waited for.
     let _ = waits.and_then(|()| stream.set_write_timeout(Some(TURN_AWAY_TIME))).and_then(|()| stream.read(&mut [0; MOST_BYTES]));
-    answer(stream, "503 Service Unavailable", "", &format!("{why}\n"));
+    answer(stream, NO_ROOM, "", &format!("{why}\n"));
 }
 
 fn answer(stream: &mut impl Write, status: &str, header: &str, body: &str) {

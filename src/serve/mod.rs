@@ -19,6 +19,7 @@ mod msgpack;
 mod paced;
 mod policy;
 mod rows;
+mod seats;
 mod server;
 mod session;
 mod socket;

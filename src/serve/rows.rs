@@ -1,7 +1,6 @@
 //! Rows of states under the names that LeRobot gives their parts, or under those of the columns that a policy has learned from.
 
 use super::value::Value;
-use crate::config::MOST_STEPS;
 use crate::demo::LARGEST_NUMBER;
 use crate::layout::{Layout, Span};
 use serde_json::{Map, Value as Json};
@@ -19,9 +18,6 @@ pub const WHOLE: &str = "state";
 pub const FRAME: &str = "frame_index";
 /// Number of an episode.
 pub const EPISODE: &str = "episode_index";
-
-/// The longest episode that is run: the longest horizon of a policy.
-pub const MOST_HORIZON_STEPS: u32 = 2 * MOST_STEPS;
 
 /// Takes rows apart and puts them together.
 #[derive(Clone, Debug)]

@@ -4,6 +4,7 @@ use super::access::Token;
 use super::handshake::{shake, turn_away};
 use super::link::Link;
 use super::paced::{Paced, TICK};
+use super::seats::{PATIENCE, Seats};
 use super::socket::SocketLink;
 use crate::error::{Error, Result};
 use crate::guard::guarded;
@@ -13,6 +14,9 @@ use std::io::ErrorKind;
 use std::net::{IpAddr, SocketAddr, TcpListener, TcpStream};
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::thread;
+
+/// Callers at the same time who have not yet said who they are: more than come at once, less than a machine has threads.
+const MOST_CALLERS: usize = 64;
 
 /// Where is listened, and to whom.
 #[derive(Debug)]
@@ -66,25 +70,32 @@ impl Server {
     /// # Errors
     /// [`Error::Interrupted`], when all conversations have ended.
     pub fn run(&self, host: &dyn Host, interrupt: &Interrupt, say: &(dyn Fn(&str) + Sync)) -> Result<()> {
-        let open = AtomicUsize::new(0);
+        let (callers, seats) = (AtomicUsize::new(0), Seats::new(self.most, PATIENCE));
         thread::scope(|scope| {
             for number in 0.. {
                 let (mut stream, peer) = self.next(interrupt)?;
-                if open.fetch_add(1, Ordering::SeqCst) >= self.most {
-                    open.fetch_sub(1, Ordering::SeqCst);
-                    turn_away(&mut stream, "all connections are taken; try again later");
+                let caller = Caller::new(&callers);
+                if callers.load(Ordering::SeqCst) > MOST_CALLERS {
+                    turn_away(&mut stream, "too many call at once; try again later");
                     continue;
                 }
-                let (open, work) = (&open, move || self.converse(stream, peer, host, number, interrupt, say));
+                let seats = &seats;
+                let work = move || {
+                    let Ok(mut stream) = Paced::new(stream, interrupt) else { return };
+                    let Some((came, seat)) = shake(&mut stream, self.token.as_ref(), || seats.take()) else { return };
+                    drop(caller);
+                    match host.converse(&mut SocketLink::new(stream, came, seat), number) {
+                        Ok(()) | Err(Error::Interrupted) => {}
+                        Err(why) => say(&format!("{peer}: {why}")),
+                    }
+                };
                 let started = thread::Builder::new().name(format!("client {number}")).spawn_scoped(scope, move || {
                     // One that breaks down is the end of one conversation.
                     if let Err(why) = guarded(work) {
                         say(&format!("{peer}: the conversation broke down: {why}"));
                     }
-                    open.fetch_sub(1, Ordering::SeqCst);
                 });
                 if let Err(e) = started {
-                    open.fetch_sub(1, Ordering::SeqCst);
                     say(&format!("{peer}: turned away, no thread is to be had: {e}"));
                 }
             }
@@ -108,21 +119,20 @@ impl Server {
             }
         }
     }
+}
 
-    fn converse(
-        &self,
-        stream: TcpStream,
-        peer: SocketAddr,
-        host: &dyn Host,
-        number: u64,
-        interrupt: &Interrupt,
-        say: &(dyn Fn(&str) + Sync),
-    ) {
-        let Ok(mut stream) = Paced::new(stream, interrupt) else { return };
-        let Some(came) = shake(&mut stream, self.token.as_ref()) else { return };
-        match host.converse(&mut SocketLink::new(stream, came), number) {
-            Ok(()) | Err(Error::Interrupted) => {}
-            Err(why) => say(&format!("{peer}: {why}")),
-        }
+/// One who has called and not yet been let in; counted as long as the value lives.
+struct Caller<'a>(&'a AtomicUsize);
+
+impl<'a> Caller<'a> {
+    fn new(count: &'a AtomicUsize) -> Self {
+        count.fetch_add(1, Ordering::SeqCst);
+        Caller(count)
+    }
+}
+
+impl Drop for Caller<'_> {
+    fn drop(&mut self) {
+        self.0.fetch_sub(1, Ordering::SeqCst);
     }
 }

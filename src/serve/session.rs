@@ -52,6 +52,8 @@ pub struct Session<'a> {
     acting: &'a Acting,
     /// The conversation's number: it names the episode where the robot does not.
     number: u64,
+    /// The episode, by the robot's number or by that.
+    episode: u64,
     rng: Option<ChaCha8Rng>,
     /// Observations in this episode.
     asked: u64,
@@ -76,13 +78,24 @@ enum Watch {
 impl<'a> Session<'a> {
     pub fn new(acting: &'a Acting, number: u64) -> Self {
         let dq = vec![0.0; acting.rows.layout().velocities().len()];
-        let mut session = Session { acting, number, rng: None, asked: 0, held: Vec::new(), before: None, dq, watch: Watch::Off };
+        let mut session = Session {
+            acting,
+            number,
+            episode: number,
+            rng: None,
+            asked: 0,
+            held: Vec::new(),
+            before: None,
+            dq,
+            watch: Watch::Off,
+        };
         session.begin(number);
         session
     }
 
     /// A new episode: nothing of what was before counts.
     fn begin(&mut self, episode: u64) {
+        self.episode = episode;
         self.rng = self.acting.options.sampling.map(|seed| stream(seed, "evaluate.action", episode));
         (self.asked, self.before) = (0, None);
         self.dq.fill(0.0);
@@ -99,7 +112,7 @@ impl<'a> Session<'a> {
     /// No observation has come for too long: the command is to stand still, and what comes next begins anew.
     pub fn stop(&mut self) -> Value<'static> {
         self.watch = Watch::Late;
-        self.begin(self.number);
+        self.begin(self.episode);
         let mut zero = Value::map([("actions", self.actions(&vec![0.0; self.acting.rows.layout().action_dim()]))]);
         zero.insert("watchdog", Value::Bool(true));
         zero
@@ -129,6 +142,8 @@ impl<'a> Session<'a> {
         let mut row = self.acting.rows.row(message, self.acting.needs_dq())?;
         if message.get(FRAME).and_then(Value::as_u64) == Some(0) {
             self.begin(episode(message.get(EPISODE)).unwrap_or(self.number));
+            // Between two episodes a robot may rest.
+            self.watch = Watch::Off;
         }
         let late = matches!(self.watch, Watch::Late);
         self.watch = Watch::Since(Instant::now());

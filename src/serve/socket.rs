@@ -3,6 +3,7 @@
 use super::link::{Link, MOST_MESSAGE_BYTES, Message, Received};
 use super::msgpack;
 use super::paced::{Paced, is_tick};
+use super::seats::Seat;
 use super::value::Value;
 use crate::error::Result;
 use std::time::{Duration, Instant};
@@ -23,15 +24,16 @@ pub fn limits() -> WebSocketConfig {
 }
 
 /// The server's end of a WebSocket.
-pub struct SocketLink {
+pub struct SocketLink<'a> {
     socket: WebSocket<Paced>,
+    seat: Seat<'a>,
     gone: bool,
 }
 
-impl SocketLink {
+impl<'a> SocketLink<'a> {
     /// Behind the handshake, with what has come since.
-    pub fn new(stream: Paced, came: Vec<u8>) -> Self {
-        SocketLink { socket: WebSocket::from_partially_read(stream, came, Role::Server, Some(limits())), gone: false }
+    pub fn new(stream: Paced, came: Vec<u8>, seat: Seat<'a>) -> Self {
+        SocketLink { socket: WebSocket::from_partially_read(stream, came, Role::Server, Some(limits())), seat, gone: false }
     }
 
     fn write(&mut self, frame: Frame) {
@@ -40,12 +42,15 @@ impl SocketLink {
     }
 }
 
-impl Link for SocketLink {
+impl Link for SocketLink<'_> {
     fn receive(&mut self, patience: Option<Duration>) -> Result<Received> {
         let began = Instant::now();
         while !self.gone {
             self.socket.get_ref().check()?;
             let read = self.socket.read();
+            if read.is_ok() {
+                self.seat.heard();
+            }
             match read {
                 Ok(Frame::Binary(bytes)) => {
                     self.socket.get_mut().whole();
@@ -58,6 +63,10 @@ impl Link for SocketLink {
                 }
                 // Pings are answered by the next call.
                 Ok(_) => self.socket.get_mut().whole(),
+                Err(SocketError::Io(e)) if is_tick(&e) && self.seat.is_lost() => {
+                    self.refuse("silent for long, and another has come; connect again");
+                    self.gone = true;
+                }
                 Err(SocketError::Io(e)) if is_tick(&e) => {
                     if patience.is_some_and(|patience| began.elapsed() >= patience) {
                         return Ok(Received::Silence);
@@ -87,7 +96,7 @@ impl Link for SocketLink {
     }
 }
 
-impl Drop for SocketLink {
+impl Drop for SocketLink<'_> {
     fn drop(&mut self) {
         // The other end hears that it is over; a broken connection has nobody to tell.
         let _ = self.socket.close(None);

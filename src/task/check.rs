@@ -3,6 +3,10 @@
 use super::{MOST_OBJECTS, Object, Place, Shape, Spread, Target, Task};
 use crate::words::shown;
 
+/// What the joints' positions and velocities are called in a state.
+const JOINTS: [&str; 2] = ["q", "dq"];
+/// Whose names objects may not have.
+const NOT_FREE: &str = "a part of every state (q, dq) or a goal of this task on the table; give it another name";
 /// Longest name of a task or an object.
 const LONGEST_NAME: usize = 32;
 /// Edges of an object \[m\].
@@ -40,7 +44,10 @@ pub(super) fn check(task: &Task) -> Result<(), String> {
     for goal in 0..task.goals.len() {
         check_goal(task, goal).map_err(|why| format!("goal {goal}: {why}"))?;
     }
-    Ok(())
+    // Columns of datasets and of the log are called by them.
+    let taken: Vec<String> = JOINTS.map(String::from).into_iter().chain(task.goal_names()).collect();
+    let clash = task.objects.iter().find(|object| taken.contains(&object.name));
+    clash.map_or(Ok(()), |object| Err(format!("an object is called \"{}\", as is {}", object.name, NOT_FREE)))
 }
 
 fn name(of: &str, name: &str, joint: char) -> Result<(), String> {

@@ -99,7 +99,7 @@ impl Imports {
         sources(root, &mut paths);
         let files: BTreeMap<Module, PathBuf> = paths.into_iter().map(|path| (module_of(&path, root), path)).collect();
         let mut imports = Imports { files, reexports: BTreeMap::new(), edges: BTreeMap::new() };
-        imports.files.retain(|module, _| *module != ["lib"] && *module != ["main"]);
+        imports.files.retain(|module, _| *module != ["lib"]);
         let codes: Vec<(Module, String)> = imports.files.iter().map(|(module, path)| (module.clone(), code(path))).collect();
         for (module, code) in &codes {
             let handed_on = statements(code).0.into_iter().filter(|(hands_on, _)| *hands_on);
@@ -111,8 +111,13 @@ impl Imports {
         }
         for (module, code) in &codes {
             let (imported, rest) = statements(code);
-            let trees = imported.into_iter().filter(|(hands_on, _)| !hands_on).flat_map(|(_, tree)| expand(tree));
-            let known: Vec<Vec<String>> = trees.chain(paths_in(&rest)).collect();
+            // What a module hands on of its own children is no import; of another room it is.
+            let is_own = |path: &Vec<String>| imports.absolute(module, path).is_none_or(|to| to.first() == module.first());
+            let trees = |(hands_on, tree): (bool, &str)| {
+                let paths = expand(tree).into_iter();
+                paths.filter(|path| !(hands_on && is_own(path))).collect::<Vec<_>>()
+            };
+            let known: Vec<Vec<String>> = imported.into_iter().flat_map(trees).chain(paths_in(&rest)).collect();
             let homes = known.iter().filter_map(|path| imports.home(imports.absolute(module, path)?, 0));
             let edges = homes.filter(|home| home != module).collect();
             imports.edges.insert(module.clone(), edges);
@@ -125,6 +130,8 @@ impl Imports {
         let ups = path.iter().take_while(|name| *name == "super").count();
         match path.first()?.as_str() {
             "crate" => Some(path[1..].to_vec()),
+            // The binary sees the library from outside.
+            "hilt" if *module == ["main"] => Some(path[1..].to_vec()),
             "self" => Some([module, &path[1..]].concat()),
             "super" => Some([&module[..module.len().checked_sub(ups)?], &path[ups..]].concat()),
             first => self.files.contains_key(&[module.as_slice(), &[first.into()]].concat()).then(|| [module, path].concat()),

@@ -1,6 +1,7 @@
 //! A sweep killed at random moments.
 
 use crate::sweep::{STEPS, Sweep, TINY, same};
+use std::process::Command;
 use std::time::{Duration, Instant};
 
 /// Kills of a sweep.
@@ -22,9 +23,16 @@ fn killed_and_undisturbed(text: &str) {
         let wait = undisturbed.mul_f64(2.0 * random() / f64::from(KILLS + 1)).max(Duration::from_millis(5));
         let mut child = killed.start(&["--jobs", "2", "--threads", "2"]);
         std::thread::sleep(wait);
-        child.kill().expect("killed");
+        // The runner alone, whose steps go on to their end, or all of them, in the middle of whatever they do.
+        let whole_group = kill % 2 == 0;
+        if whole_group {
+            let group = format!("-{}", child.id());
+            Command::new("kill").args(["-KILL", "--", &group]).status().expect("kill runs");
+        }
+        // It may have ended by itself.
+        let _ = child.kill();
         child.wait().expect("ended");
-        println!("kill {kill} after {wait:.1?} of {undisturbed:.1?}");
+        println!("kill {kill} after {wait:.1?} of {undisturbed:.1?}, with its steps: {whole_group}");
     }
     killed.done(&["--jobs", "2", "--threads", "2"]);
     same(&killed.results(), &whole.results());

@@ -3,6 +3,7 @@
 use crate::files::{contents, text};
 use std::collections::BTreeMap;
 use std::fs;
+use std::os::unix::process::CommandExt;
 use std::path::PathBuf;
 use std::process::{Child, Command, Output, Stdio};
 use tempfile::TempDir;
@@ -78,7 +79,8 @@ impl Sweep {
 
     /// Begins it.
     pub fn start(&self, flags: &[&str]) -> Child {
-        self.command(flags).spawn().expect("the binary runs")
+        // A group of its own, with the steps that it begins: they can be killed together.
+        self.command(flags).process_group(0).spawn().expect("the binary runs")
     }
 
     /// Runs it; it must be refused with all of `says` in one error, and leave all files as they are.

@@ -136,7 +136,8 @@ impl Made {
     }
 }
 
-fn table(path: &Path, columns: &[(String, ArrayRef)], group: usize) {
+/// Writes a table, `group` rows to a row group.
+pub fn table(path: &Path, columns: &[(String, ArrayRef)], group: usize) {
     fs::create_dir_all(path.parent().expect("a parent")).expect("made");
     let batch = RecordBatch::try_from_iter(columns.iter().map(|(name, array)| (name, Arc::clone(array)))).expect("columns");
     let mut writer = ArrowWriter::try_new(fs::File::create(path).expect("a file"), batch.schema(), None).expect("a writer");

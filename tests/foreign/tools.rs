@@ -1,10 +1,13 @@
 //! `hilt dataset`: what it says, what it makes, and that nothing is lost.
 
-use crate::made::{Made, TINY, contents, done, fixture, made, refused};
-use arrow_array::{ArrayRef, Float64Array, Int32Array};
-use hilt::data::dataset::foreign::{Choice, Root, open, problems};
+use crate::made::{Made, TINY, contents, done, fixture, made, refused, table};
+use arrow_array::cast::AsArray;
+use arrow_array::types::Int64Type;
+use arrow_array::{ArrayRef, Float64Array, Int32Array, Int64Array, StringArray};
+use hilt::data::dataset::foreign::{Choice, Root, instructions, open, problems};
 use hilt::data::dataset::{self, read};
 use hilt::interrupt::Interrupt;
+use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
 use serde_json::{Value, json};
 use std::fs;
 use std::path::Path;
@@ -49,7 +52,7 @@ fn every_problem_is_named_and_a_sound_dataset_has_none() {
         done(Path::new("."), &["dataset", "validate", &fixture(name).display().to_string()]);
     }
     type Spoil = fn(&mut Made);
-    let spoilt: [(Spoil, &str); 9] = [
+    let spoilt: [(Spoil, &str); 10] = [
         (|m| numbers(m, "action", 5, f64::NAN), "column action, row 5, entry 0: NaN is not a finite number (0 more"),
         (|m| numbers(m, "timestamp", 17, 9.0), "column timestamp, row 17: 9, expected 0.5"),
         (
@@ -64,6 +67,14 @@ fn every_problem_is_named_and_a_sound_dataset_has_none() {
         (
             |m| *m.column("task_index") = Arc::new(Int32Array::from(vec![3; 60])) as ArrayRef,
             "column task_index, row 0: 3 is none of the 1 tasks",
+        ),
+        (
+            // Regression: only the first row that was read at a time was looked at.
+            |m| {
+                *m.column("task_index") =
+                    Arc::new(Int32Array::from_iter_values((0..60).map(|row| i32::from(row == 59)))) as ArrayRef
+            },
+            "column task_index, row 59: 1 is none of the 1 tasks",
         ),
         (|m| m.info["total_frames"] = json!(61), "says 6 episodes of 61 frames"),
         (|m| m.info["fps"] = json!(12.5), "fps is a whole number"),
@@ -86,6 +97,13 @@ fn every_problem_is_named_and_a_sound_dataset_has_none() {
         let out = String::from_utf8_lossy(&output.stdout).into_owned();
         assert!(output.status.code() == Some(1) && out.lines().count() == found.len(), "{out}");
     }
+}
+
+/// Other words for the tasks of a dataset.
+fn words<const N: usize>(root: &Path, words: [Option<&str>; N]) {
+    let numbers = Arc::new(Int64Array::from_iter_values(0..N as i64)) as ArrayRef;
+    let words = Arc::new(StringArray::from(words.to_vec())) as ArrayRef;
+    table(&root.join("meta/tasks.parquet"), &[("task_index".into(), numbers), ("task".into(), words)], 100);
 }
 
 fn numbers(made: &mut Made, name: &str, row: usize, value: f64) {
@@ -146,6 +164,24 @@ fn filter_drop_split_merge_and_convert_write_sound_datasets_of_the_same_numbers(
     done(dir.path(), &[&["train", "--method", "bc", "--dataset", "s"][..], &TINY].concat());
 }
 
+/// Regression: what has no `meta/tasks.parquet` was given the other's task.
+#[test]
+fn merged_datasets_keep_their_own_tasks() {
+    let dir = place();
+    made(&[4, 7]).without("note").write(&dir.path().join("bare"));
+    fs::remove_file(dir.path().join("bare/meta/tasks.parquet")).expect("removed");
+    words(&dir.path().join("d"), [Some("swing")]);
+    // meta/episodes says "hold still" of both, the tasks of d another word.
+    done(dir.path(), &["dataset", "merge", "d", "bare", "--out", "m"]);
+    assert_eq!(instructions(&dir.path().join("m")).expect("tasks"), ["swing", "hold still"]);
+    let mut tasks = Vec::new();
+    let table = fs::File::open(dir.path().join("m/data/chunk-000/file-000.parquet")).expect("a file");
+    for batch in ParquetRecordBatchReaderBuilder::try_new(table).expect("a table").build().expect("a reader") {
+        tasks.extend_from_slice(batch.expect("rows")["task_index"].as_primitive::<Int64Type>().values());
+    }
+    assert_eq!(tasks, [vec![0; 60], vec![1; 11]].concat());
+}
+
 #[test]
 fn the_same_words_give_the_same_bytes() {
     let (one, other) = (place(), place());
@@ -186,6 +222,17 @@ fn bad_input_is_refused_and_nothing_is_lost() {
     made(&LENGTHS).write(&dir.path().join("text"));
     made(&[4]).without("note").write(&dir.path().join("one"));
     made(&LENGTHS).without("note").without("next.success").write(&dir.path().join("other"));
+    let mut turned = made(&LENGTHS).without("note");
+    turned.info["features"]["observation.state"]["names"] = json!(["v", "x", "k"]);
+    turned.write(&dir.path().join("turned"));
+    let mut another = made(&LENGTHS).without("note");
+    another.info["robot_type"] = json!("pendulum");
+    another.write(&dir.path().join("another"));
+    let mut large = made(&LENGTHS).without("note");
+    numbers(&mut large, "action", 31, 1e39);
+    large.write(&dir.path().join("large"));
+    made(&LENGTHS).without("note").write(&dir.path().join("wordless"));
+    words(&dir.path().join("wordless"), [None]);
     fs::create_dir(dir.path().join("mine")).expect("made");
     fs::write(dir.path().join("mine/thesis.tex"), "years").expect("written");
     done(dir.path(), &["dataset", "split", "d", "--out", "s"]);
@@ -211,6 +258,11 @@ fn bad_input_is_refused_and_nothing_is_lost() {
         (&["split", "one", "--out", "x"], 1, "has one episode"),
         (&["merge", "d", "other", "--out", "x"], 1, "do not both have a column next.success of 1 bool"),
         (&["merge", "d", "d", "--out", "x"], 1, "is the same dataset as d"),
+        // Regression: these went together, and the second's numbers under the first's names.
+        (&["merge", "d", "turned", "--out", "x"], 1, "turned: calls entry 0 of column observation.state \"v\", d calls it \"x\""),
+        (&["merge", "d", "another", "--out", "x"], 1, "another: is of a robot \"pendulum\", d of \"spring\""),
+        (&["convert", "large", "--out", "x"], 1, "action, row 31: has 1e39, single precision holds at most 3.4"),
+        (&["info", "wordless"], 1, "has a task without words"),
         (&["convert", "d", "--out", "d"], 2, "--out d: is d, which this command reads"),
         (&["convert", "d", "--out", "d/inner"], 2, "lies in d"),
         (&["convert", "d", "--out", "other"], 2, "--out other: holds a dataset that hilt did not write, which would be lost"),

@@ -104,8 +104,13 @@ fn an_output_that_holds_another_artefact_is_refused() {
 fn pictures_and_logs_of_somebody_else_stay() {
     let run = Run::finished();
     let recording = run.name("recordings/episode-00000.mcap");
-    let of_others: [(&str, &[u8]); 3] =
-        [("mine.gif", b"GIF89a mine"), ("mine.png", b"\x89PNG\r\n\x1a\n mine"), ("mine.log", b"Monday, with tea\n")];
+    let drawing = "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"9px\"><g aria-label=\"tea\"/></svg>";
+    let of_others: [(&str, &[u8]); 4] = [
+        ("mine.gif", b"GIF89a mine"),
+        ("mine.png", b"\x89PNG\r\n\x1a\n mine"),
+        ("mine.log", b"Monday, with tea\n"),
+        ("mine.svg", drawing.as_bytes()),
+    ];
     for (name, bytes) in of_others {
         fs::write(run.at(name), bytes).expect("written");
     }
@@ -114,6 +119,7 @@ fn pictures_and_logs_of_somebody_else_stay() {
         (render("mine.gif"), "a file that hilt did not write"),
         (render("mine.png"), "a file that hilt did not write"),
         (words(&["inspect", &recording, "--log", &run.name("mine.log")]), "is there already"),
+        (words(&["plot", &run.name("policy.training.parquet"), "--out", &run.name("mine.svg")]), "is there already"),
     ] {
         refused_as_usage(&run, of, &[says, "would be lost"]);
     }
@@ -121,6 +127,9 @@ fn pictures_and_logs_of_somebody_else_stay() {
         done(&hilt(render(name)));
         done(&hilt(render(name)));
     }
+    let plot = words(&["plot", &run.name("policy.training.parquet"), "--out", &run.name("own.svg")]);
+    done(&hilt(plot.clone()));
+    done(&hilt(plot));
     // A log is of the last command, with the reason for which that failed.
     let log = run.name("own.log");
     done(&hilt(with(&run, "plan", "--log", &log)));

@@ -10,6 +10,7 @@ from playwright.sync_api import sync_playwright
 
 page_file = pathlib.Path(sys.argv[1]).resolve() / "index.html"
 shots = pathlib.Path(sys.argv[2])
+files = list((page_file.parent / "figures").glob("*.svg"))
 sizes = {"wide": (1400, 900), "phone": (390, 800)}
 wrong = []
 
@@ -29,8 +30,8 @@ with sync_playwright() as playwright:
             page.goto(page_file.as_uri())
             page.evaluate("document.querySelectorAll('details').forEach(d => { d.open = true })")
             figures = page.locator("figure svg")
-            if figures.count() == 0:
-                wrong.append(f"{name}: no figure")
+            if figures.count() != len(files) or not files:
+                wrong.append(f"{name}: {figures.count()} figures, {len(files)} in figures/")
             for i in range(figures.count()):
                 box = figures.nth(i).bounding_box()
                 if box is None or box["width"] < 100 or box["height"] < 50:

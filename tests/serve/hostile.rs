@@ -1,11 +1,12 @@
 //! Clients that are broken, slow, many, or mean.
 
-use crate::servers::{PATIENCE, Served, Talk, observation};
+use crate::servers::{PATIENCE, Served, Talk, host, observation, row};
+use hilt::interrupt::Interrupt;
 use hilt::seed::stream;
-use hilt::serve::{Array, Value, encode};
+use hilt::serve::{Array, Host, LineLink, PolicyOptions, Value, encode};
 use rand::{Rng, RngExt};
 use std::fs;
-use std::io::{Read, Write};
+use std::io::{Cursor, Read, Write};
 use std::net::{TcpListener, TcpStream};
 use std::time::{Duration, Instant};
 use tungstenite::Message;
@@ -76,13 +77,40 @@ fn broken_messages_to_a_world_are_each_answered_and_episodes_go_on() {
     let action = Value::Array(Array::f32(&[9], &[0.1; 9]));
     let step = encode(&Value::map([("step", Value::map([("action", action)]))]));
     let reset = encode(&Value::map([("reset", Value::map([("episode", Value::Int(3))]))]));
-    for number in 0..3_000 {
+    let before = memory();
+    for number in 0..MESSAGES {
         let bytes = mutated(if number % 8 == 0 { &reset } else { &step }, &mut rng);
         assert!(talk.say(bytes.clone()), "message {number} ended the conversation");
         assert!(talk.hear().is_some(), "message {number}, {bytes:?}");
     }
+    let growth = memory().saturating_sub(before);
+    assert!(growth < MOST_GROWTH, "{growth} bytes more");
     assert!(talk.say(reset) && matches!(talk.hear(), Some(Message::Binary(_))));
     server.end();
+}
+
+#[test]
+fn broken_lines_are_each_answered_and_leave_nothing() {
+    let mut rng = stream(3, "hostile", 0);
+    let whole = serde_json::json!({ "state": row(), "frame_index": 3, "prompt": "Pick up the block." }).to_string();
+    let mut lines = Vec::new();
+    for _ in 0..MESSAGES {
+        let line = mutated(whole.as_bytes(), &mut rng);
+        lines.extend(line.into_iter().filter(|byte| *byte != b'\n'));
+        lines.extend(b" \n");
+    }
+    lines.extend(format!("{whole}\n").as_bytes());
+    let (mut out, before) = (Vec::new(), memory());
+    let mut link = LineLink::new(Cursor::new(lines), &mut out, &Interrupt::default()).expect("a thread");
+    host(PolicyOptions::default()).converse(&mut link, 0).expect("no interrupt");
+    drop(link);
+    let answers: Vec<&[u8]> = out.split(|byte| *byte == b'\n').collect();
+    // Behind the metadata; a line of blanks alone is none.
+    assert!((MESSAGES - MESSAGES / 20..=MESSAGES + 3).contains(&answers.len()), "{} answers", answers.len());
+    let last = String::from_utf8_lossy(answers[answers.len() - 2]);
+    assert!(last.contains("\"actions\""), "{last}");
+    let growth = memory().saturating_sub(before);
+    assert!(growth < MOST_GROWTH, "{growth} bytes more");
 }
 
 #[test]
@@ -169,6 +197,20 @@ fn there_is_room_for_so_many_and_again_when_one_leaves() {
     drop(first);
     let mut third = (0..100).find_map(|_| Talk::with(server.address, None).ok().or_else(|| pause(20))).expect("room again");
     assert_eq!(second.ask(), third.ask());
+}
+
+/// Regression: connections that never said who they were took all places from those who may.
+#[test]
+fn who_has_not_shown_the_token_takes_no_place() {
+    let server = Served::new(2, Some("a secret of enough letters"));
+    let silent: Vec<TcpStream> = (0..30).map(|_| TcpStream::connect(server.address).expect("a connection")).collect();
+    for mut half in &silent[..15] {
+        half.write_all(b"GET / HTTP/1.1\r\nHost: x\r\n").expect("written");
+    }
+    let header = Some(("Authorization", "Bearer a secret of enough letters"));
+    let mut talk = Talk::with(server.address, header).expect("admitted");
+    assert_eq!(talk.ask().len(), 9);
+    server.end();
 }
 
 #[test]

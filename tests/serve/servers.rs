@@ -50,6 +50,11 @@ impl Served {
         Self::run(most, token, |server, stop| server.run(&host(PolicyOptions::default()), stop, &|_| ()))
     }
 
+    /// With these options.
+    pub fn with(options: PolicyOptions) -> Self {
+        Self::run(4, None, |server, stop| server.run(&host(options), stop, &|_| ()))
+    }
+
     /// The world of pick-up.
     pub fn world() -> Self {
         Self::run(4, None, |server, stop| {
@@ -123,7 +128,12 @@ impl Talk {
 
     /// The answer to a good observation.
     pub fn ask(&mut self) -> Vec<f32> {
-        assert!(self.say(observation()));
+        self.ask_at(None)
+    }
+
+    /// The answer to one that begins an episode.
+    pub fn ask_at(&mut self, episode: Option<u64>) -> Vec<f32> {
+        assert!(self.say(observation_of(episode)));
         let Some(Message::Binary(bytes)) = self.hear() else { panic!("no answer") };
         let answer = hilt::serve::decode(&bytes).expect("msgpack");
         answer.get("actions").expect("actions").numbers().expect("numbers").values
@@ -138,13 +148,23 @@ pub fn row() -> Vec<f32> {
 
 /// A good observation.
 pub fn observation() -> Vec<u8> {
+    observation_of(None)
+}
+
+/// The same, which may begin an episode.
+fn observation_of(episode: Option<u64>) -> Vec<u8> {
     let row = row();
     let part = |numbers: &[f32]| Value::Array(Array::f32(&[numbers.len()], numbers));
-    encode(&Value::map([
+    let mut all = Value::map([
         ("observation.state", part(&row[..18])),
         ("observation.environment_state", part(&row[18..])),
         ("prompt", Value::text("Pick up the block.")),
-    ]))
+    ]);
+    if let Some(episode) = episode {
+        all.insert("frame_index", Value::Int(0));
+        all.insert("episode_index", Value::Int(episode as i64));
+    }
+    encode(&all)
 }
 
 /// `hilt ARGUMENTS` that listens on a free port; it is killed with the value.

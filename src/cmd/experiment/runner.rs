@@ -8,6 +8,7 @@ use crate::data::ContentHash;
 use crate::error::{Error, Result};
 use crate::experiment::estimate::{Estimate, in_words};
 use crate::experiment::state::{Contents, look, states};
+use crate::guard::guarded;
 use std::path::PathBuf;
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::Instant;
@@ -100,7 +101,8 @@ impl Runner<'_> {
     fn work(&self) {
         while let Some((step, contents)) = self.next() {
             let began = Instant::now();
-            let result = self.step(step, &contents);
+            // A panic that ended this thread would leave the others waiting for it.
+            let result = guarded(|| self.step(step, &contents)).unwrap_or_else(|panic| Err(Error::Failed(panic)));
             let mut progress = self.progress();
             progress.running -= 1;
             if !self.context.interrupt.is_raised() {

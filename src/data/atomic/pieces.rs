@@ -3,6 +3,7 @@
 use super::{directory, finish, temporary};
 use crate::error::{Error, Result};
 use std::fs::{self, File, TryLockError};
+use std::io::ErrorKind;
 use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
 use std::thread::sleep;
@@ -48,7 +49,10 @@ impl Workplace {
         for _ in 0..TRIES {
             fs::create_dir_all(path).map_err(io)?;
             temporary::sweep(path);
-            let Ok(handle) = File::open(path) else { continue };
+            let handle = match File::open(path) {
+                Err(gone) if gone.kind() == ErrorKind::NotFound => continue,
+                opened => opened.map_err(|e| Error::io(path, "open", e))?,
+            };
             let number = |found: std::io::Result<fs::Metadata>| found.ok().map(|found| found.ino());
             let is_there = || number(handle.metadata()) == number(fs::metadata(path));
             match handle.try_lock_shared() {

@@ -3,7 +3,7 @@
 use super::features::{Feature, features};
 use super::meta::{CODEBASE_VERSION, INFO, LAYOUT};
 use crate::data::bytes::Format;
-use crate::data::{ContentHash, Provenance, json_file, provenance, seal};
+use crate::data::{ContentHash, Provenance, json_file, json_text, provenance, seal};
 use crate::error::{Error, Result};
 use crate::layout::Layout;
 use crate::robot::file::built_in::paper_robot;
@@ -53,7 +53,7 @@ pub(super) fn info(root: &Path) -> Result<Info> {
     }
     let bytes = DESCRIPTION.read(&path)?;
     let invalid = |e: serde_json::Error| Error::input(&path, format!("cannot be read: {e}"));
-    let mut value: Value = serde_json::from_slice(&bytes).map_err(invalid)?;
+    let mut value: Value = json_text::parse(&bytes).map_err(|why| Error::input(&path, format!("cannot be read: {why}")))?;
     let version = value.get("codebase_version").and_then(Value::as_str).unwrap_or("none");
     if version != CODEBASE_VERSION {
         let message = format!("has codebase_version \"{version}\", hilt reads \"{CODEBASE_VERSION}\"; run hilt convert again");

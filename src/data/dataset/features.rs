@@ -61,7 +61,7 @@ pub(super) fn features(layout: &Layout) -> Vec<Feature> {
     let scalar = |name, kind, doc| Feature { kind, ..Feature::of(name, 1, doc) };
     vec![
         vector(STATE, body, "joint positions [rad, m], then joint velocities [rad/s, m/s], before the action"),
-        vector(ENVIRONMENT, world, "pose of the block [m, unit quaternion], then the task's constants (goal or base block)"),
+        vector(ENVIRONMENT, world, "poses of the objects [m, unit quaternion], then the task's places on the table [m]"),
         vector(ACTION, &actions, "joint velocities that the controller asked for [rad/s, m/s]"),
         vector(EXECUTED, &actions, "joint velocities that the motors were given: action + noise, clamped [rad/s, m/s]"),
         vector(NEXT_STATE, body, "observation.state after the action; keeps the last state of an episode"),

@@ -65,15 +65,17 @@ pub fn read(root: &Path) -> Result<Dataset> {
         rewards.push(episode.rewards);
         successes.push(episode.success);
         source_episodes.push(episode.source_index);
+        Ok(())
     })?;
     Ok(Dataset { task, layout, fps, demos, rewards, successes, source_episodes, provenance, files })
 }
 
-/// As [`read`], in the memory of one file: shows every episode to `see`, in order. What was shown counts only when all could be read.
+/// As [`read`], in the memory of one file: shows every episode to `see`, in order, until that fails. What was shown counts only when all
+/// could be read.
 ///
 /// # Errors
-/// As [`read`].
-pub fn each(root: &Path, see: impl FnMut(DatasetEpisode)) -> Result<Description> {
+/// As [`read`], and what `see` returns.
+pub fn each(root: &Path, see: impl FnMut(DatasetEpisode) -> Result<()>) -> Result<Description> {
     let info = check::info(root)?;
     let mut rows = Rows::new(&info.layout, see);
     let mut rewritten = None;

@@ -62,7 +62,7 @@ struct Batch<'a> {
     success: &'a BooleanBuffer,
 }
 
-impl<F: FnMut(DatasetEpisode)> Rows<F> {
+impl<F: FnMut(DatasetEpisode) -> Result<()>> Rows<F> {
     /// No rows of a dataset of this layout.
     pub(super) fn new(layout: &Arc<Layout>, see: F) -> Self {
         let (features, now, layout) = (features(layout), Episode::default(), Arc::clone(layout));
@@ -101,8 +101,7 @@ impl<F: FnMut(DatasetEpisode)> Rows<F> {
             done: batch[DONE].as_boolean().values(),
             success: batch[SUCCESS].as_boolean().values(),
         };
-        (0..batch.num_rows()).for_each(|r| self.take(&columns, r));
-        Ok(())
+        (0..batch.num_rows()).try_for_each(|r| self.take(&columns, r))
     }
 
     fn check_column(&self, path: &Path, batch: &RecordBatch, feature: &Feature) -> Result<()> {
@@ -124,7 +123,7 @@ impl<F: FnMut(DatasetEpisode)> Rows<F> {
     }
 
     /// Adds a row to the episode that it belongs to.
-    fn take(&mut self, batch: &Batch, r: usize) {
+    fn take(&mut self, batch: &Batch, r: usize) -> Result<()> {
         let now = &mut self.now;
         let frame = now.rewards.len();
         let found = batch.places.map(|column| column[r]);
@@ -151,21 +150,24 @@ impl<F: FnMut(DatasetEpisode)> Rows<F> {
         now.executed.extend(&batch.executed[of_row]);
         now.rewards.push(batch.rewards[r]);
         self.frames += 1;
-        if batch.done.value(r) {
-            self.end_episode(batch.success.value(r));
-        }
+        if batch.done.value(r) { self.end_episode(batch.success.value(r)) } else { Ok(()) }
     }
 
-    fn end_episode(&mut self, success: bool) {
+    fn end_episode(&mut self, success: bool) -> Result<()> {
         let Episode { states, next, actions, executed, rewards, source } = &mut self.now;
         states.append(next);
         // Copies as long as the episode, where what they are copied from has room for the longest.
-        match Demo::new(&self.layout, states.as_slice().into(), actions.as_slice().into(), executed.as_slice().into()) {
+        let seen = match Demo::new(&self.layout, states.as_slice().into(), actions.as_slice().into(), executed.as_slice().into())
+        {
             Ok(demo) => (self.see)(DatasetEpisode { source_index: *source, demo, rewards: rewards.as_slice().into(), success }),
-            Err(what) => drop(self.wrong.get_or_insert_with(|| format!("episode {}: {what}", self.episodes))),
-        }
+            Err(what) => {
+                self.wrong.get_or_insert_with(|| format!("episode {}: {what}", self.episodes));
+                Ok(())
+            }
+        };
         [states, actions, executed, rewards].into_iter().for_each(Vec::clear);
         self.episodes += 1;
+        seen
     }
 
     /// Checks what holds of all rows together.

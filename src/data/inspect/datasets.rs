@@ -6,11 +6,12 @@ use super::statistics::{Columns, statistics};
 use crate::data::dataset;
 use crate::data::dataset::foreign::{instructions, is_foreign};
 use crate::error::{Error, Result};
+use crate::interrupt::Interrupt;
 use serde_json::{Value, json};
 use std::path::Path;
 
 /// One root.
-pub(super) fn one(root: &Path) -> Result<Value> {
+pub(super) fn one(root: &Path, interrupt: &Interrupt) -> Result<Value> {
     if is_foreign(root) {
         return foreign::one(root);
     }
@@ -23,12 +24,14 @@ pub(super) fn one(root: &Path) -> Result<Value> {
         states.add(episode.demo.states(), episode.demo.layout().state_dim());
         actions.add(episode.demo.actions(), episode.demo.layout().action_dim());
         executed.add(episode.demo.executed(), episode.demo.layout().action_dim());
+        interrupt.check()
     })?;
     // The squares of the distances from the means, which are known now.
     let again = dataset::each(root, |episode| {
         states.add_again(episode.demo.states());
         actions.add_again(episode.demo.actions());
         executed.add_again(episode.demo.executed());
+        interrupt.check()
     })?;
     if again != found {
         return Err(Error::input(root, "changed while it was read; run hilt inspect again"));

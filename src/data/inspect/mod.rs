@@ -70,13 +70,13 @@ fn format(path: &Path) -> Result<Format> {
 
 fn directory(path: &Path, interrupt: &Interrupt) -> Result<Value> {
     if path.join("meta").is_dir() {
-        return datasets::one(path);
+        return datasets::one(path, interrupt);
     }
     let roots: Vec<&str> = [TRAIN, VALIDATION].into_iter().filter(|name| path.join(name).is_dir()).collect();
     if !roots.is_empty() {
         let mut found = Map::from_iter([("kind".to_string(), json!("datasets"))]);
         for name in roots {
-            found.insert(name.into(), datasets::one(&path.join(name))?);
+            found.insert(name.into(), datasets::one(&path.join(name), interrupt)?);
         }
         return Ok(Value::Object(found));
     }

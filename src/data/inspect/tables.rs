@@ -2,9 +2,9 @@
 
 use super::answer::answer;
 use super::statistics::Running;
-use crate::data::table_file::{self, Reader};
+use crate::data::table_file::Reader;
 use crate::error::Result;
-use crate::table::{Column, Table, Values};
+use crate::table::{Column, Table, Values, unit_of};
 use serde_json::{Map, Value, json};
 use std::collections::HashSet;
 use std::path::Path;
@@ -80,7 +80,7 @@ fn described((column, found): (&Column, &Found)) -> Value {
         Found::Texts(texts) => ("text", Map::from_iter([("distinct".to_string(), json!(texts.len()))])),
     };
     fields.extend([("name", json!(column.name)), ("type", json!(kind)), ("doc", json!(column.doc))].map(|(k, v)| (k.into(), v)));
-    if let Some(unit) = table_file::unit_of(&column.name) {
+    if let Some(unit) = unit_of(&column.name) {
         fields.insert("unit".into(), json!(unit));
     }
     Value::Object(fields)

@@ -5,7 +5,7 @@ use super::older;
 use super::topics::{OUTCOME_TOPIC, ROBOT_NAME, SCENE_TOPIC, STEP_TOPIC, TASK_NAME};
 use super::walk::Outline;
 use crate::config::{self, check_scene};
-use crate::data::proto;
+use crate::data::{json_text, proto};
 use crate::demo::{Body, Contacts, Episode, Phase, Step, Touch};
 use crate::joints::Joints;
 use crate::robot::Robot;
@@ -19,7 +19,7 @@ use std::collections::BTreeSet;
 use std::sync::Arc;
 
 /// Most control steps of a recording: twice the longest demonstration that settings allow, which is the horizon of its policy.
-const MOST_STEPS: usize = 2 * config::MOST_STEPS as usize;
+const MOST_STEPS: usize = config::MOST_HORIZON_STEPS as usize;
 /// Most bytes of a message that is read; a step has some 700, a scene 60 for every obstacle.
 const MOST_MESSAGE_BYTES: usize = 64 << 10;
 
@@ -111,7 +111,7 @@ fn attached<T: DeserializeOwned>(outline: &Outline, name: &str) -> Result<Option
     if bytes.len() > MOST_ATTACHED_BYTES {
         return Err(format!("{name} has {} bytes, at most {MOST_ATTACHED_BYTES} are read", bytes.len()));
     }
-    serde_json::from_slice(bytes).map(Some).map_err(|e| format!("{name} cannot be read: {e}"))
+    json_text::parse(bytes).map(Some).map_err(|e| format!("{name} cannot be read: {e}"))
 }
 
 fn scene(robot: &Arc<Robot>, task: Option<&Arc<Task>>, message: proto::Scene) -> Result<Scene, String> {

@@ -11,7 +11,7 @@ use rand::Rng;
 /// Labelled finger velocity above which the hand closes or holds, and below whose negative it opens \[rad/s, and what counts as one\].
 const FINGER_COMMAND_RAD_S: f32 = 0.2;
 
-/// Root mean square error of the mean action on the validation demos \[rad/s\].
+/// Root mean square error of the mean action on the validation demos \[rad/s, and what counts as one\].
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct ActionError {
     /// What drives the arm, or all, where nothing is known to drive fingers.
@@ -75,7 +75,8 @@ fn action_errors(
         let closing = fingers.clone().map(|i| (offset[i] + unit[i] * label(r, i)) / layout.closing_unit(i)).sum::<f32>()
             / fingers.len().max(1) as f32;
         let class = 1 + usize::from(closing > FINGER_COMMAND_RAD_S) - usize::from(closing < -FINGER_COMMAND_RAD_S);
-        let square = |i: usize| f64::from(unit[i] * (mean[i] - label(r, i))).powi(2);
+        let one = |i: usize| layout.action_unit(i).unwrap_or(1.0);
+        let square = |i: usize| f64::from(unit[i] * (mean[i] - label(r, i)) / one(i)).powi(2);
         sums[class][0] += others().map(square).sum::<f64>();
         sums[class][1] += fingers.clone().map(square).sum::<f64>();
         sums[class][2] += 1.0;

@@ -7,7 +7,7 @@ use crate::interrupt::Interrupt;
 use crate::layout::{Holds, Layout};
 use crate::math::acos;
 use crate::nn::{LANES, Panels, Pass};
-use crate::table::{Table, Values};
+use crate::table::{Table, Values, unit_of};
 use std::ops::Range;
 
 /// What pretraining reports.
@@ -55,12 +55,15 @@ fn groups(layout: &Layout) -> Vec<Group> {
         let name = &span.name;
         match span.holds {
             Holds::JointPositions | Holds::JointVelocities => {
-                let unit = if span.holds == Holds::JointPositions { "rad" } else { "rad/s" };
+                let usual = if span.holds == Holds::JointPositions { "rad" } else { "rad/s" };
                 let parts = [("arm", layout.arm()), ("finger", layout.fingers())];
                 if parts.iter().all(|(_, part)| part.is_empty()) {
-                    push(name.clone(), unit, at.clone(), Measure::Mean);
+                    push(name.clone(), usual, at.clone(), Measure::Mean);
                 }
-                parts.into_iter().for_each(|(part, range)| push(format!("{part}_{name}"), unit, of(range), Measure::Mean));
+                for (part, range) in parts {
+                    let unit = span.entries[range.clone()].first().and_then(|entry| unit_of(entry)).unwrap_or(usual);
+                    push(format!("{part}_{name}"), unit, of(range), Measure::Mean);
+                }
             }
             Holds::Pose => {
                 push(format!("{name}_position"), "m", at.start..at.start + 3, Measure::Distance);

@@ -5,7 +5,7 @@ use super::features::Features;
 use super::older;
 use super::scaling::Scaling;
 use super::weights::{Reader, push_features, push_network, push_scaling, vector};
-use crate::config::{MOST_STEPS, TrainSettings};
+use crate::config::{MOST_HORIZON_STEPS, TrainSettings};
 use crate::layout::Layout;
 use crate::math::{exp_f32, ln};
 use crate::nn::{Lanes, Mlp, Pass};
@@ -19,8 +19,6 @@ use std::sync::Arc;
 const ACTION_FLOOR_RAD_S: f32 = 0.01;
 /// The horizon of an episode over the 95th percentile of the demos' lengths.
 const HORIZON_OVER_P95: usize = 2;
-/// The longest horizon: no demo has more steps than `simulate.max_steps` may be.
-const MOST_HORIZON_STEPS: u32 = HORIZON_OVER_P95 as u32 * MOST_STEPS;
 
 /// pi_theta with everything needed to run it.
 ///
@@ -61,7 +59,9 @@ impl Policy {
         let mut lengths: Vec<usize> = (0..corpus.demos()).map(|i| corpus.demo(i).len()).collect();
         lengths.sort_unstable();
         let p95 = lengths[(lengths.len() * 95).div_ceil(100) - 1];
-        Self::with_scalings(features, action, (HORIZON_OVER_P95 * p95) as u32, settings, rng)
+        // Demos of another program may be longer than any that is simulated.
+        let horizon_steps = (HORIZON_OVER_P95 * p95).min(MOST_HORIZON_STEPS as usize) as u32;
+        Self::with_scalings(features, action, horizon_steps, settings, rng)
     }
 
     /// The same, where scalings and horizon are known.
@@ -228,6 +228,15 @@ mod tests {
         other = meta.clone();
         other["network"] = json!("dynamics");
         assert!(refused(&tensors, &other).contains("dynamics"));
+    }
+
+    /// Regression: demos of another program that were longer than any here made a policy that nothing read.
+    #[test]
+    fn demos_of_any_length_make_a_policy_that_can_be_read() {
+        let corpus = Corpus::new(demos(Toy::Stack, 1, MOST_HORIZON_STEPS as usize / 2 + 50, 0), "training").expect("demos");
+        let policy = Policy::new(&corpus, &TrainSettings::default(), &mut stream(0, "test", 0));
+        assert_eq!(policy.horizon_steps(), MOST_HORIZON_STEPS);
+        assert_eq!(Policy::from_tensors(&policy.to_tensors(), &policy.meta()), Ok(policy));
     }
 
     #[test]

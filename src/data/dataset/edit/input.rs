@@ -39,7 +39,7 @@ impl Input {
         let own = match is_foreign(path) {
             true => None,
             false => {
-                let found = read::each(path, |_| ())?;
+                let found = read::each(path, |_| Ok(()))?;
                 Some((found.layout, found.provenance))
             }
         };
@@ -79,6 +79,21 @@ impl Input {
     /// Its name: of its task, or of its directory.
     pub fn name(&self) -> String {
         self.own.as_ref().map_or_else(|| task_name(&self.root.path, &self.root.info), |(_, made)| made.task.clone())
+    }
+
+    /// Its tasks in words, in the order of their numbers. Without `meta/tasks.parquet` those that its episodes name, or its own name.
+    pub(super) fn tasks(&self) -> Vec<String> {
+        let of_episodes = self.root.episodes.iter().flat_map(|episode| &episode.tasks);
+        let mut tasks = self.instructions.clone();
+        for text in of_episodes.filter(|_| self.instructions.is_empty()) {
+            if !tasks.contains(text) {
+                tasks.push(text.clone());
+            }
+        }
+        if tasks.is_empty() {
+            tasks.push(self.name());
+        }
+        tasks
     }
 
     /// The names of its columns.

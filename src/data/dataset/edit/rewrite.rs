@@ -10,6 +10,7 @@ use crate::data::dataset::write::{Episode, Filling, Form};
 use crate::data::{Provenance, atomic};
 use crate::error::{Error, Result};
 use crate::interrupt::Interrupt;
+use crate::words::shown;
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 
@@ -66,7 +67,7 @@ pub fn write(out: &Path, inputs: &[Input], plan: &Plan, parts: &[Part], interrup
     })
 }
 
-/// All inputs have the same columns, and none that cannot be written.
+/// All inputs have the same columns, of entries that are called alike, and none that cannot be written.
 fn check(inputs: &[Input], plan: &Plan) -> Result<()> {
     let first = &inputs[0];
     for input in inputs {
@@ -98,6 +99,26 @@ fn check(inputs: &[Input], plan: &Plan) -> Result<()> {
                 "and {} do not both have a column {name} of {width} {kind}; drop it from the one (hilt dataset drop --columns {name}) or \
                  convert both (hilt dataset convert)",
                 first.root.path.display()
+            ));
+        }
+        let called = |input: &Input, name: &str| input.features.iter().find(|f| *f.name == *name).and_then(|f| f.names.clone());
+        for (name, ..) in &ours {
+            if let (Some(ours), Some(theirs)) = (called(first, name), called(input, name))
+                && let Some(at) = (0..ours.len()).find(|at| ours[*at] != theirs[*at])
+            {
+                let (path, ours, theirs) = (first.root.path.display(), shown(&ours[at]), shown(&theirs[at]));
+                return refuse(format!(
+                    "calls entry {at} of column {name} \"{theirs}\", {path} calls it \"{ours}\"; bring them into one order, or where they are the \
+                     same correct the names in meta/info.json"
+                ));
+            }
+        }
+        if let (Some(ours), Some(theirs)) = (&first.root.info.robot_type, &input.root.info.robot_type)
+            && ours != theirs
+        {
+            let (path, ours, theirs) = (first.root.path.display(), shown(ours), shown(theirs));
+            return refuse(format!(
+                "is of a robot \"{theirs}\", {path} of \"{ours}\"; where they are the same correct robot_type in meta/info.json"
             ));
         }
         let same = match (&input.own, &first.own) {
@@ -135,13 +156,10 @@ fn provenance(inputs: &[Input], plan: &Plan) -> Provenance {
 
 fn about(inputs: &[Input], plan: &Plan) -> About {
     let (first, mut tasks) = (&inputs[0], Vec::<String>::new());
-    for text in inputs.iter().flat_map(|input| &input.instructions) {
-        if !tasks.contains(text) {
-            tasks.push(text.clone());
+    for text in inputs.iter().flat_map(Input::tasks) {
+        if !tasks.contains(&text) {
+            tasks.push(text);
         }
-    }
-    if tasks.is_empty() {
-        tasks.push(first.name());
     }
     About {
         robot_type: first.root.info.robot_type.clone(),
@@ -163,11 +181,14 @@ fn numbered(
     let n = frames.length;
     let given = |name: &str| wanted.iter().position(|f| *f.name == *name).map(|at| &frames.cells[at]);
     let mut tasks = input.root.episodes[frames.number].tasks.clone();
+    if tasks.is_empty() {
+        tasks.extend(input.tasks().into_iter().next());
+    }
     let fill = |feature: &Feature| -> Result<Cells> {
         Ok(match (&*feature.name, given(&feature.name)) {
             (EPISODE, _) => Cells::I64(vec![number as i64; n]),
             (INDEX, _) => Cells::I64((first..first + n).map(|i| i as i64).collect()),
-            (TASK, found) => Cells::I64(task_numbers(input, form, found, frames)?),
+            (TASK, found) => Cells::I64(task_numbers(input, form, found, frames, &tasks)?),
             (TIMESTAMP, found) if found.is_none() || plan.normalise => {
                 Cells::F32((0..n).map(|t| timestamp_at(t, form.about.fps)).collect())
             }
@@ -177,19 +198,18 @@ fn numbered(
         })
     };
     let cells = form.features.iter().map(fill).collect::<Result<Vec<_>>>()?;
-    if tasks.is_empty() {
-        tasks.push(form.about.tasks[0].clone());
-    }
     Ok(Episode { cells, tasks })
 }
 
-/// The new numbers of the tasks of an episode's frames.
-fn task_numbers(input: &Input, form: &Form, found: Option<&Cells>, frames: &Frames) -> Result<Vec<i64>> {
-    let Some(Cells::I64(old)) = found.filter(|_| !input.instructions.is_empty()) else { return Ok(vec![0; frames.length]) };
+/// The new numbers of the tasks of an episode's frames: the first of the episode where they have none that says anything.
+fn task_numbers(input: &Input, form: &Form, found: Option<&Cells>, frames: &Frames, tasks: &[String]) -> Result<Vec<i64>> {
+    let at = |text: &String| form.about.tasks.iter().position(|task| task == text).map(|at| at as i64);
+    let Some(Cells::I64(old)) = found.filter(|_| !input.instructions.is_empty()) else {
+        return Ok(vec![tasks.first().and_then(at).unwrap_or(0); frames.length]);
+    };
     let new = |old: &i64| {
         let text = usize::try_from(*old).ok().and_then(|old| input.instructions.get(old));
-        let at = text.and_then(|text| form.about.tasks.iter().position(|task| task == text));
-        at.map(|at| at as i64).ok_or_else(|| {
+        text.and_then(at).ok_or_else(|| {
             let message = format!("episode {} has {TASK} {old}, which is not in meta/tasks.parquet", frames.number);
             Error::input(&input.root.path, message)
         })

@@ -3,6 +3,7 @@
 use crate::data::ContentHash;
 use crate::data::dataset::cells::Kind;
 use crate::data::dataset::check::DESCRIPTION;
+use crate::data::json_text;
 use crate::error::{Error, Result};
 use crate::layout::MOST_ENTRIES;
 use crate::words::shown;
@@ -97,7 +98,7 @@ impl Info {
             return Err(Error::input(root, format!("is no dataset: {INFO} is missing")));
         }
         let bytes = DESCRIPTION.read(&path)?;
-        let value: Value = serde_json::from_slice(&bytes).map_err(|e| Error::input(&path, format!("cannot be read: {e}")))?;
+        let value: Value = json_text::parse(&bytes).map_err(|why| Error::input(&path, format!("cannot be read: {why}")))?;
         of_value(&value, ContentHash::of(&bytes)).map_err(|why| Error::input(&path, why))
     }
 

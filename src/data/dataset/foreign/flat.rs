@@ -16,7 +16,21 @@ pub(super) fn append(column: &ArrayRef, width: usize, cells: &mut Cells) -> Resu
     let other = || (None, format!("has type {}, meta/info.json says other", column.data_type()));
     match (cells, flat.data_type()) {
         (Cells::Bool(to), DataType::Boolean) => to.extend(flat.as_boolean().values()),
-        (Cells::F32(to), kind) => floats(&flat, kind, |v| to.push(v as f32)).ok_or_else(other)?,
+        (Cells::F32(to), kind) => {
+            let (from, mut too_large) = (to.len(), None);
+            let take = |v: f64| {
+                let single = v as f32;
+                if v.is_finite() && single.is_infinite() {
+                    too_large.get_or_insert((to.len() - from, v));
+                }
+                to.push(single);
+            };
+            floats(&flat, kind, take).ok_or_else(other)?;
+            if let Some((at, value)) = too_large {
+                let what = format!("has {value:e}, single precision holds at most {:e} either way", f32::MAX);
+                return Err((Some(at / width.max(1)), what));
+            }
+        }
         (Cells::F64(to), kind) => floats(&flat, kind, |v| to.push(v)).ok_or_else(other)?,
         (Cells::I64(to), kind) => integers(&flat, kind, |v| to.push(v)).ok_or_else(other)?,
         _ => return Err(other()),
@@ -86,7 +100,7 @@ fn integers(array: &ArrayRef, kind: &DataType, mut take: impl FnMut(i64)) -> Opt
         DataType::UInt8 => each::<UInt8Type>(array, |v| take(i64::from(v))),
         DataType::UInt16 => each::<UInt16Type>(array, |v| take(i64::from(v))),
         DataType::UInt32 => each::<UInt32Type>(array, |v| take(i64::from(v))),
-        DataType::UInt64 => each::<UInt64Type>(array, |v| take(v as i64)),
+        DataType::UInt64 => each::<UInt64Type>(array, |v| take(i64::try_from(v).unwrap_or(i64::MAX))),
         _ => return None,
     }
     Some(())
@@ -125,5 +139,10 @@ mod tests {
         assert!(append(&reals, 1, &mut ints).expect_err("refused").1.contains("Float64"));
         let holes: ArrayRef = Arc::new(Float64Array::from(vec![Some(0.5), Some(1.0), None]));
         assert_eq!(append(&holes, 1, &mut floats).expect_err("refused"), (Some(2), "has an empty cell".into()));
+        let large: ArrayRef = Arc::new(Float64Array::from(vec![0.5, f64::NEG_INFINITY, -1e39, 1e300]));
+        let (row, why) = append(&large, 2, &mut none_of(Kind::F32)).expect_err("no width of two");
+        assert_eq!((row, why), (Some(0), "has 1 values, meta/info.json says 2".into()));
+        let (row, why) = append(&large, 1, &mut none_of(Kind::F32)).expect_err("too large");
+        assert!(row == Some(2) && why.contains("-1e39") && why.contains("3.4028235e38"), "{row:?} {why}");
     }
 }

@@ -26,7 +26,7 @@ pub use validate::problems;
 
 use super::check::DESCRIPTION;
 use super::meta::LAYOUT;
-use crate::data::provenance;
+use crate::data::{json_text, provenance};
 use crate::error::Result;
 use description::INFO;
 use serde_json::Value;
@@ -89,6 +89,6 @@ pub fn of_others(dir: &Path, stage: &str) -> Option<String> {
 /// The descriptions of the dataset in a directory, or of the two in it, as far as they can be read.
 fn descriptions(dir: &Path) -> impl Iterator<Item = Value> {
     let roots = [dir.to_path_buf(), dir.join(super::TRAIN), dir.join(super::VALIDATION)];
-    let read = |root: PathBuf| serde_json::from_slice::<Value>(&DESCRIPTION.read(&root.join(INFO)).ok()?).ok();
+    let read = |root: PathBuf| json_text::parse::<Value>(&DESCRIPTION.read(&root.join(INFO)).ok()?).ok();
     roots.into_iter().filter_map(read).filter(Value::is_object)
 }

@@ -15,7 +15,7 @@ const NUMBER: &str = "task_index";
 /// The instruction of each task, in the order of their numbers; none where the file is missing.
 ///
 /// # Errors
-/// [`Error::Input`] when it cannot be decoded, or numbers no task from 0 on.
+/// [`Error::Input`] when it cannot be decoded, has a task without words, or numbers no task from 0 on.
 pub fn instructions(root: &Path) -> Result<Vec<String>> {
     let path = root.join(TASKS);
     if !path.is_file() {
@@ -27,7 +27,12 @@ pub fn instructions(root: &Path) -> Result<Vec<String>> {
         let batch = batch?;
         let column = WORDS.iter().find_map(|name| batch.column_by_name(name));
         let column = column.ok_or_else(|| Error::input(&path, "has no column task"))?;
-        words.extend(text_values(column));
+        let texts = text_values(column);
+        if texts.len() != batch.num_rows() {
+            let kind = column.data_type();
+            return Err(Error::input(&path, format!("has a task without words, or words of another kind than text ({kind})")));
+        }
+        words.extend(texts);
         let column = batch.column_by_name(NUMBER).ok_or_else(|| Error::input(&path, format!("has no column {NUMBER}")))?;
         flat::append(column, 1, &mut numbers).map_err(|(_, why)| Error::input(&path, format!("column {NUMBER} {why}")))?;
     }

@@ -17,9 +17,18 @@ pub static METRICS: [Metric; 18] = [
     Metric::column("grad_sc", "Norm of the gradient of L_SC alone at the epoch's first update"),
     Metric::column("skipped_updates", "Updates left out so far because a gradient was not finite"),
     Metric::column("arm_error_opening_rad_s", "Validation RMS error, arm joints, while the demo opens its fingers"),
-    Metric::column("finger_error_opening_rad_s", "Validation RMS error, fingers, while the demo opens them"),
+    Metric::column(
+        "finger_error_opening_rad_s",
+        "Validation RMS error, fingers (what counts as rad/s where they slide), while the demo opens them",
+    ),
     Metric::column("arm_error_still_rad_s", "Validation RMS error, arm joints, while the demo's fingers keep still"),
-    Metric::column("finger_error_still_rad_s", "Validation RMS error, fingers, while the demo keeps them still"),
+    Metric::column(
+        "finger_error_still_rad_s",
+        "Validation RMS error, fingers (what counts as rad/s where they slide), while the demo keeps them still",
+    ),
     Metric::column("arm_error_closing_rad_s", "Validation RMS error, arm joints, while the demo closes or holds"),
-    Metric::column("finger_error_closing_rad_s", "Validation RMS error, fingers, while the demo closes or holds"),
+    Metric::column(
+        "finger_error_closing_rad_s",
+        "Validation RMS error, fingers (what counts as rad/s where they slide), while the demo closes or holds",
+    ),
 ];

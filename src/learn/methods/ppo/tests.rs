@@ -64,6 +64,21 @@ fn go_on(ppo: &mut Ppo, iterations: u64) -> Vec<Row> {
 }
 
 #[test]
+fn passes_end_where_the_policy_has_moved_too_far() {
+    let updates = |target_kl: f64| {
+        let mut settings = settings();
+        settings.ppo.target_kl = target_kl;
+        let mut ppo = toy(&settings);
+        go_on(&mut ppo, 2);
+        ppo.updates
+    };
+    let [never, soon] = [0.0, 1e-7].map(updates);
+    // 16 worlds of 32 steps in batches of 128, in each pass.
+    let most = 2 * settings().ppo.epochs * 16 * 32 / 128;
+    assert!(never == most && (2..most / 2).contains(&soon), "{soon} updates of {never}, of {most}");
+}
+
+#[test]
 fn threads_and_a_break_change_no_bit() {
     let settings = settings();
     let with = |threads: usize| {

@@ -8,7 +8,8 @@ use super::{Root, instructions, is_foreign};
 use crate::data::dataset::features::{EPISODE, FRAME, INDEX, TASK, TIMESTAMP};
 use crate::data::dataset::meta::{STATS, TASKS};
 use crate::data::dataset::{check::DESCRIPTION, read};
-use crate::error::Result;
+use crate::data::json_text;
+use crate::error::{Error, Result};
 use crate::interrupt::Interrupt;
 use problems::Problems;
 use rows::Scan;
@@ -36,7 +37,11 @@ pub fn problems(root: &Path, interrupt: &Interrupt) -> Result<Vec<String>> {
     };
     if !is_foreign(root) {
         // Its seal and its own rules.
-        found.take(root, read::each(root, |_| ()).map(drop));
+        let read = read::each(root, |_| interrupt.check());
+        if matches!(read, Err(Error::Interrupted)) {
+            return Err(Error::Interrupted);
+        }
+        found.take(root, read.map(drop));
     }
     described(&info, &mut found);
     let opened = Root::open(root);
@@ -87,7 +92,7 @@ fn statistics(root: &Path, info: &Info, found: &mut Problems) {
         Err(why) => return found.take(root, Err(why)),
     };
     // Python writes NaN and Infinity, which JSON has not.
-    let Ok(value) = serde_json::from_slice::<Value>(&bytes) else {
+    let Ok(value) = json_text::parse::<Value>(&bytes) else {
         return found.say(format!("{STATS} is no JSON, or holds NaN or Infinity"));
     };
     for column in info.features.iter().filter(|column| column.is_numeric()) {

@@ -121,9 +121,12 @@ impl<'a> Scan<'a> {
 
     /// Columns that say where a row belongs, when and of which task it is.
     fn place(&mut self, column: &Declared, cells: &Cells) {
+        if column.width() != 1 || ![INDEX, EPISODE, FRAME, TIMESTAMP, TASK].contains(&column.name.as_str()) {
+            return;
+        }
         let values = cells.to_f64();
         let (mut episode, mut first) = (0, 0);
-        for (r, value) in values.iter().enumerate().take_while(|_| column.width() == 1) {
+        for (r, value) in values.iter().enumerate() {
             let row = self.rows + r;
             while let Some(length) = self.root.episodes.get(episode).map(|e| e.length).filter(|length| row >= first + length) {
                 (episode, first) = (episode + 1, first + length);
@@ -141,7 +144,7 @@ impl<'a> Scan<'a> {
                     let what = format!("column {TASK}, row {row}: {value} is none of the {} tasks in {TASKS}", self.tasks);
                     return self.once(TASK, "task", what);
                 }
-                _ => return,
+                _ => *value,
             };
             if *value != expected {
                 let name = &column.name;
