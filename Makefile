@@ -278,7 +278,7 @@ transfer: ## the policy of TASK on DeepMind's Jaco in MuJoCo, EPISODES of them (
 meta-world: build ## BC, HIL and two rivals on Meta-World's 50 tasks: RUNS/meta-world (hours; stopped, it goes on; SEEDS, EPISODES, JOBS; needs Python 3.11; docs/meta-world.md)
 	python/meta_world/run.sh $(HILT) $(RUNS)/meta-world $(RUNS)/meta-world-report $(if $(SEEDS),--seeds $(SEEDS)) $(if $(EPISODES),--episodes $(EPISODES)) $(if $(JOBS),--jobs $(JOBS))
 
-interop: build ## tiny runs of all tasks, read by mcap, pyarrow, DuckDB, pandas, LeRobot, safetensors, ONNX (needs Python 3.12)
+interop: build ## tiny runs of all tasks, read by mcap, pyarrow, DuckDB, pandas, LeRobot, safetensors, ONNX, driven by openpi's client and Stable-Baselines3, and the tests under python (needs Python 3.12)
 	for task in $(TASKS); do $(MAKE) --no-print-directory all TASK=$$task RUNS=$(RUNS)/smoke SET="$(SMOKE)"; done
 	tests/interop/policies.sh $(HILT) $(RUNS)/smoke
 	tests/interop/run.sh $(RUNS)/smoke $(HILT)

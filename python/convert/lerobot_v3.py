@@ -1,7 +1,8 @@
 """Writes a LeRobotDataset v3.0 from arrays: the one writer behind the converters beside it. Needs numpy and pyarrow.
 
 An episode is a dict of column names to arrays of T rows: `observation.state`, `action`, and what else there is (`next.reward`, `next.done`,
-`next.success`). Rows stream to the disk episode by episode; the dataset takes its place when it is whole.
+`next.success`). Rows stream to the disk episode by episode: memory holds one of them, what is said of each, and running statistics. The dataset
+takes its place when it is whole.
 """
 
 import json
@@ -14,22 +15,14 @@ from pathlib import Path
 import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
+from stats import Running, statistics
 
 DATA_PATH = "data/chunk-{chunk_index:03d}/file-{file_index:03d}.parquet"
 FILE_BYTES = 100_000_000  # LeRobot's own size of a data file
-QUANTILES = {"q01": 0.01, "q10": 0.10, "q50": 0.50, "q90": 0.90, "q99": 0.99}
 
 
 class Refused(Exception):
     """What is wrong with the input, in words."""
-
-
-def statistics(values):
-    """LeRobot's statistics of the rows of a column."""
-    values = np.atleast_2d(np.asarray(values, np.float64).reshape(len(values), -1))
-    found = {"min": values.min(0), "max": values.max(0), "mean": values.mean(0), "std": values.std(0)}
-    found |= {name: np.quantile(values, q, axis=0) for name, q in QUANTILES.items()}
-    return {name: value.tolist() for name, value in found.items()} | {"count": [len(values)]}
 
 
 def as_column(name, values):
@@ -71,7 +64,7 @@ def write(root, episodes, fps, *, robot_type=None, names=None):
 
 
 def _fill(root, episodes, fps, robot_type, names):
-    tasks, table, shapes, kept, first, file, writer = {}, [], None, {}, 0, 0, None
+    tasks, table, shapes, running, first, file, writer = {}, [], None, {}, 0, 0, None
     for number, (task, columns) in enumerate(episodes):
         columns = {name: as_column(name, values) for name, values in columns.items()}
         lengths = {name: len(values) for name, values in columns.items()}
@@ -100,7 +93,9 @@ def _fill(root, episodes, fps, robot_type, names):
         row = {"episode_index": number, "tasks": [task], "length": length, "data/chunk_index": file // 1000, "data/file_index": file % 1000}
         row |= {"dataset_from_index": first, "dataset_to_index": first + length, "meta/episodes/chunk_index": 0, "meta/episodes/file_index": 0}
         for name, values in columns.items():
-            kept.setdefault(name, []).append(values)
+            if name not in running:
+                running[name] = Running(values.shape[1])
+            running[name].add(values)
             row |= {f"stats/{name}/{key}": value for key, value in statistics(values).items()}
         table.append(row)
         first += length
@@ -111,10 +106,11 @@ def _fill(root, episodes, fps, robot_type, names):
         writer.close()
     if not table:
         raise Refused("no episode was found")
-    _describe(root, table, tasks, shapes, kept, first, fps, robot_type, names)
+    stats = {name: of.found() for name, of in running.items()}
+    _describe(root, table, tasks, shapes, stats, first, fps, robot_type, names)
 
 
-def _describe(root, table, tasks, shapes, kept, frames, fps, robot_type, names):
+def _describe(root, table, tasks, shapes, stats, frames, fps, robot_type, names):
     path = root / "meta/episodes/chunk-000/file-000.parquet"
     path.parent.mkdir(parents=True)
     pq.write_table(pa.Table.from_pylist(table), path)
@@ -125,7 +121,6 @@ def _describe(root, table, tasks, shapes, kept, frames, fps, robot_type, names):
     columns = [column("task_index", "int64", "int64"), column("task", "unicode", "object")]
     pandas = {"index_columns": ["task"], "column_indexes": [index], "columns": columns, "pandas_version": "2.2.3"}
     pq.write_table(words.replace_schema_metadata({"pandas": json.dumps(pandas)}), root / "meta/tasks.parquet")
-    stats = {name: statistics(np.concatenate(parts)) for name, parts in kept.items()}
     (root / "meta/stats.json").write_text(json.dumps(stats, indent=2) + "\n")
     dtype = lambda kind: {"bool": "bool", "int64": "int64", "float32": "float32"}[str(kind)]
     features = {name: {"dtype": dtype(kind), "shape": [width], "names": names.get(name)} for name, (kind, width) in shapes.items()}

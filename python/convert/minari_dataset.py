@@ -1,10 +1,10 @@
 """A Minari dataset (https://minari.farama.org) as a LeRobotDataset v3.0.
 
-    python minari_dataset.py D4RL/door/human-v2 OUT [--fps 100] [--task WORDS]
+    python minari_dataset.py D4RL/door/human-v2 OUT --fps 100 [--task WORDS]
 
 The dataset is one of this machine (`minari list local`; `minari download NAME` fetches it). An episode has T actions and T + 1 observations: the last
 one goes into next.observation.state. Observations may be a dict of numbers, which are put side by side in the order of their names; actions are
-numbers. Needs minari[hdf5], numpy and pyarrow.
+numbers. --fps is the control rate of its environment, which Minari does not say. Needs minari[hdf5], numpy and pyarrow.
 """
 
 import argparse

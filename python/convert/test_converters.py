@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pyarrow.parquet as pq
 import pytest
+from stats import QUANTILES, SKETCH_ROWS, Running, statistics
 
 HERE = Path(__file__).parent
 
@@ -33,6 +34,41 @@ def refused(script, *words, cwd, said):
     done = run(script, *words, cwd=cwd)
     assert done.returncode == 1 and said in done.stderr and "Traceback" not in done.stderr, done.stderr
     assert not (cwd / "out").exists() and not list(cwd.glob(".out*")), "nothing is left"
+
+
+def parts_and_whole(rows, seed):
+    """Rows far from 0 and rows with outliers, in parts of many lengths."""
+    rng = np.random.default_rng(seed)
+    whole = np.stack([1e6 + rng.standard_normal(rows), rng.standard_cauchy(rows), np.arange(rows)], axis=1)
+    return np.split(whole, np.sort(rng.integers(1, rows, 9)) if rows > 9 else []), whole
+
+
+@pytest.mark.parametrize("rows", [1, 2, 500, 2 * SKETCH_ROWS - 1])
+def test_statistics_in_parts_are_those_of_all(rows):
+    parts, whole = parts_and_whole(rows, rows)
+    running = Running(3)
+    for part in parts:
+        if len(part):
+            running.add(part)
+    found, known = running.found(), statistics(whole)
+    assert list(found) == list(known) and found["count"] == known["count"]
+    for name in known:
+        assert np.allclose(found[name], known[name], rtol=1e-9, atol=1e-9), name
+
+
+def test_quantiles_of_many_rows_are_near_in_rank_and_memory_is_bounded():
+    rows = 40 * SKETCH_ROWS + 77
+    parts, whole = parts_and_whole(rows, 0)
+    running = Running(3)
+    for part in parts:
+        running.add(part)
+    found, whole = running.found(), np.sort(whole, axis=0)
+    assert np.allclose(found["std"], whole.std(0), rtol=1e-9)
+    bound = (1 + np.log2(rows / SKETCH_ROWS)) / (2 * SKETCH_ROWS)
+    for name, share in QUANTILES.items():
+        for entry, value in enumerate(found[name]):
+            assert abs(np.searchsorted(whole[:, entry], value) / rows - share) <= bound + 1 / rows, (name, entry)
+    assert len(running.loose) == SKETCH_ROWS and [len(block) for block in running.blocks if block is not None] == [SKETCH_ROWS] * 2, "40 is 8 + 32"
 
 
 def test_hand_dapg(tmp_path):
@@ -96,6 +132,8 @@ def test_minari(tmp_path, monkeypatch):
     assert (info["total_episodes"], info["total_frames"]) == (3, 21)
     assert np.allclose(rows["next.observation.state"][0], rows["observation.state"][1])
     assert list(rows["next.done"][:7]) == [False] * 6 + [True]
+    done = run("minari_dataset.py", "pendulum/test-v0", "other", cwd=tmp_path)
+    assert done.returncode == 2 and "--fps" in done.stderr and "OUT --fps 100 [" in (HERE / "minari_dataset.py").read_text()
 
 
 def test_rosbag2(tmp_path):

@@ -2,7 +2,8 @@
 
     python run_policy.py POLICY.safetensors STATES.npy ACTIONS.npy
 
-STATES holds a state row of the policy's layout in each row, ACTIONS gets the policy's mean action for each.
+STATES holds a state row of the policy's layout in each row, ACTIONS gets the policy's mean action for each. Policies that have learned from a
+dataset of another program (spans of `numbers` and `commands`) run too.
 """
 
 import json

@@ -4,7 +4,7 @@
 
 Counts only tasks and seeds of which all methods are finished with all numbers of demonstrations. Intervals are 95 %, by the bootstrap over tasks, and
 over seeds within them: what another choice of tasks would have given. The interquartile mean is that of rliable (Agarwal et al., NeurIPS 2021), over
-all tasks and seeds.
+all tasks and seeds. What runs of an older study.py do not say is a dash.
 """
 
 import argparse
@@ -16,12 +16,15 @@ from pathlib import Path
 
 import matplotlib
 import numpy as np
+from guard import UNKNOWN
 
 matplotlib.use("svg")
 import matplotlib.pyplot as plt  # noqa: E402
 
 DRAWS = 4000
 EVEN = 0.05  # difference in success below which a task counts as even, for one seed of 50 episodes about one standard error
+DASH = "–"
+COLUMNS = ["task", "seed", "demos", "method", "successes", "episodes", "learning_s", "steps", "most_steps", "acting_s", "policy_s"]
 LINES = {
     "hil": {"color": "black", "marker": "o", "linestyle": "-"},
     "bc": {"color": "0.45", "marker": "s", "linestyle": "--"},
@@ -36,6 +39,15 @@ def read(home):
         (run["task"], run["seed"], run["demos"], run["method"]): run
         for run in (json.loads(path.read_text()) for path in sorted(home.glob("*/*/*-*.json")))
     }
+
+
+def study(path):
+    """What the study was begun with, where it is known."""
+    try:
+        said = dict(json.loads(path.read_text()))
+        return {key: value for key, value in said.items() if key not in said.get(UNKNOWN, ())}
+    except (OSError, ValueError, TypeError) as why:
+        sys.exit(f"error: {path} cannot be read: {why}; give the --out of study.py")
 
 
 def finished(runs):
@@ -76,13 +88,16 @@ def intervals(seeds, statistic):
 
 
 def paired(seeds, ours, theirs):
-    """Mean difference with its interval; the probability that we do better on a task; tasks better, even and worse."""
+    """Mean difference, and the probability that we do better on a task, each with its interval; tasks better, even and worse."""
     difference = lambda choice: np.mean([(ours[task][rows] - theirs[task][rows]).mean() for task, rows in choice])
     low, high = intervals(seeds, difference)
     every = {task: (ours[task] - theirs[task]).mean() for task in seeds}
-    better = np.mean([np.mean((ours[task][:, None] > theirs[task]) + 0.5 * (ours[task][:, None] == theirs[task])) for task in seeds])
+    # Every seed of ours against every one of theirs; a draw is half a win.
+    wins = {task: (ours[task][:, None] > theirs[task]) + 0.5 * (ours[task][:, None] == theirs[task]) for task in seeds}
+    better = np.mean([wins[task].mean() for task in seeds])
+    least, most = intervals(seeds, lambda choice: np.mean([wins[task][np.ix_(rows, rows)].mean() for task, rows in choice]))
     counts = [sum(d > EVEN for d in every.values()), sum(abs(d) <= EVEN for d in every.values()), sum(d < -EVEN for d in every.values())]
-    return np.mean(list(every.values())), low, high, better, counts
+    return (np.mean(list(every.values())), low, high), (better, least, most), counts
 
 
 def percent(value):
@@ -105,8 +120,9 @@ def rivals(counts, methods, seeds, table):
     lines = ["| demonstrations | hil against | mean difference, points | P(hil better) | tasks better, even, worse |", "|---:|---|---:|---:|---:|"]
     for demos in counts:
         for method in (method for method in methods if method != "hil"):
-            d, low, high, better, split = paired(seeds, table[demos, "hil"], table[demos, method])
-            lines.append(f"| {demos} | {method} | {100 * d:+.1f} [{100 * low:+.1f}, {100 * high:+.1f}] | {better:.2f} | {split[0]}, {split[1]}, {split[2]} |")
+            difference, better, split = paired(seeds, table[demos, "hil"], table[demos, method])
+            points, chance = "{:+.1f} [{:+.1f}, {:+.1f}]".format(*(100 * value for value in difference)), "{:.2f} [{:.2f}, {:.2f}]".format(*better)
+            lines.append(f"| {demos} | {method} | {points} | {chance} | {split[0]}, {split[1]}, {split[2]} |")
     return lines
 
 
@@ -124,6 +140,23 @@ def times(counts, methods, runs, seeds):
     for demos in counts:
         cells = [np.mean([runs[task, seed, demos, method]["learning_s"] for task, seed in whole]) for method in methods]
         lines.append(f"| {demos} | " + " | ".join(f"{cell:.1f} s" for cell in cells) + " |")
+    return lines
+
+
+def hours(methods, runs):
+    """What the runs took in all, and how fast the served policies were; a dash where not all of the runs say it."""
+    lines = ["| | " + " | ".join(methods) + " | all |", "|---|" + "---:|" * (len(methods) + 1)]
+    groups = [[run for run in runs if method in (run["method"], None)] for method in [*methods, None]]
+    total = lambda key, of: sum(run[key] for run in of) if all(run.get(key) is not None for run in of) else None
+    rate = lambda key, of: total("steps", of) / total(key, of) if total(key, of) else None
+    for words, value in (
+        ("hours of processor time to learn", lambda of: total("learning_s", of) / 3600),
+        ("hours to act, by the clock", lambda of: None if total("acting_s", of) is None else total("acting_s", of) / 3600),
+        ("control steps a second while acting", lambda of: rate("acting_s", of)),
+        ("answers a second of the served policies alone", lambda of: rate("policy_s", of)),
+    ):
+        cells = [DASH if found is None else f"{found:.2f}" if found < 10 else f"{found:.0f}" for found in map(value, groups)]
+        lines.append(f"| {words} | " + " | ".join(cells) + " |")
     return lines
 
 
@@ -149,9 +182,10 @@ def main():
     counts, methods, seeds, table = finished(runs)
     if not seeds:
         sys.exit(f"error: {args.runs}: no task is finished with all methods; run study.py first")
-    said, trained = json.loads((args.runs / "study.json").read_text()), sum(map(len, seeds.values()))
+    said, trained = study(args.runs / "study.json"), sum(map(len, seeds.values()))
     whole = [run for key, run in runs.items() if key[1] in seeds.get(key[0], ())]
     found, lines = summary(counts, methods, seeds, table)
+    against = rivals(counts, methods, seeds, table)
     args.out.mkdir(parents=True, exist_ok=True)
     draw(args.out / "summary.svg", counts, methods, found)
     numbers = sorted({seed for of in seeds.values() for seed in of})
@@ -159,7 +193,7 @@ def main():
         "# Meta-World: HIL against its rivals",
         "",
         f"{len(seeds)} of Meta-World's 50 tasks, {trained} pairs of task and training seed (seeds {', '.join(map(str, numbers))}), {len(whole)} runs of "
-        f"{said['episodes']} episodes each. Tasks are done in an order of chance. Experts, success and simulator are Meta-World's own; "
+        f"{said.get('episodes', DASH)} episodes each ({said.get('hilt', 'hilt ' + DASH)}, commit {said.get('commit') or DASH}). Tasks are done in an order of chance. Experts, success and simulator are Meta-World's own; "
         "[how](../../meta-world.md).",
         "",
         "![Success over the number of demonstrations](summary.svg)",
@@ -170,11 +204,15 @@ def main():
         "",
         "*The same tasks, seeds and episodes side by side. A task is even within 5 points.*",
         "",
-        *rivals(counts, methods, seeds, table),
+        *against,
         "",
         "*Processor time to learn, mean: pretraining of the dynamics network counts for both that use it.*",
         "",
         *times(counts, methods, runs, seeds),
+        "",
+        f"*All of these runs together. Pretraining counts for both that use it; the ensemble asks five policies for each step. {DASH}: not all runs say it.*",
+        "",
+        *hours(methods, whole),
         "",
         f"*Solved of each task, mean over seeds [%], by the number of demonstrations; in each cell {', '.join(methods)}.*",
         "",
@@ -184,9 +222,9 @@ def main():
     (args.out / "report.md").write_text("\n".join(text))
     with open(args.out / "runs.csv", "w", newline="") as file:
         rows = csv.writer(file)
-        rows.writerow(["task", "seed", "demos", "method", "successes", "episodes", "learning_s", "steps", "most_steps"])
-        rows.writerows([run[key] for key in ("task", "seed", "demos", "method", "successes", "episodes", "learning_s", "steps", "most_steps")] for run in whole)
-    print("\n".join(lines + [""] + rivals(counts, methods, seeds, table)))
+        rows.writerow(COLUMNS)
+        rows.writerows([run.get(key, DASH) for key in COLUMNS] for run in whole)
+    print("\n".join(lines + [""] + against))
     print(args.out / "report.md")
 
 

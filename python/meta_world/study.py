@@ -10,7 +10,6 @@ finished is never done again: a run is a file OUT/TASK/SEED/DEMOS-METHOD.json, a
 """
 
 import argparse
-import json
 import math
 import multiprocessing
 import os
@@ -20,6 +19,7 @@ import signal
 import subprocess
 import sys
 import tempfile
+import time
 from contextlib import ExitStack
 from pathlib import Path
 
@@ -28,6 +28,7 @@ import numpy as np
 HERE = Path(__file__).resolve().parent
 sys.path[:0] = [str(HERE.parent / "convert"), str(HERE.parent / "hilt_gym" / "src")]
 
+from guard import made_with, same_study, whole  # noqa: E402
 from hilt_gym import PolicyClient  # noqa: E402
 from labels import Dynamics, corrective  # noqa: E402
 from lerobot_v3 import write  # noqa: E402
@@ -116,18 +117,26 @@ def save(root, episodes):
 
 
 def evaluate(binary, policies, world, episodes, most_steps):
-    """Which episodes succeed, and control steps of all of them."""
-    solved, steps = [], 0
+    """Which episodes succeed, control steps of all of them, and wall-clock seconds: of all, and of these waiting for the served policies."""
+    solved, steps, waited = [], 0, 0.0
+
+    def act(state):
+        nonlocal waited
+        asked = time.perf_counter()
+        action = np.mean([client({"observation.state": state}) for client in clients], axis=0)
+        waited += time.perf_counter() - asked
+        return action
+
     with ExitStack() as stack:
         clients = [stack.enter_context(PolicyClient(policy, binary=binary, arguments=("--quiet",))) for policy in policies]
-        act = lambda state: np.mean([client({"observation.state": state}) for client in clients], axis=0)
+        began = time.perf_counter()
         for episode in range(episodes):
             for client in clients:
                 client.reset(episode)
             _, actions, _, flags = world.run(episode % len(world.starts), act, most_steps)
             solved.append(bool(flags.any()))
             steps += len(actions)
-    return solved, steps
+        return solved, steps, time.perf_counter() - began, waited
 
 
 def missing(out, task, seed, demos, methods):
@@ -158,33 +167,14 @@ def one(job):
                 if method in ("hil", "ccil") and not dynamics.exists():
                     pretrain(shared, dataset, dynamics, sum(len(e[1]) for e in episodes[:count]), seed)
                 policies = learn(method, hilt, dataset, dynamics, episodes[:count], seed, work)
-                solved, steps = evaluate(args.hilt, policies, world, args.episodes, most_steps)
+                solved, steps, acting_s, waited_s = evaluate(args.hilt, policies, world, args.episodes, most_steps)
                 seconds = hilt.seconds + (shared.seconds if method in ("hil", "ccil") else 0.0)
                 run = {"task": task, "seed": seed, "demos": count, "method": method, "episodes": args.episodes, "successes": sum(solved)}
                 run |= {"solved": "".join("01"[flag] for flag in solved), "learning_s": round(seconds, 2), "steps": steps}
                 run |= {"most_steps": most_steps, "expert": f"{len(episodes)} of {tried}"}
+                run |= {"acting_s": round(acting_s, 2), "policy_s": round(waited_s, 2)}
                 whole(home / f"{count}-{method}.json", run)
                 print(f"{task} seed {seed}, {count} demos, {method}: {sum(solved)} of {args.episodes}, learned in {seconds:.1f} s", flush=True)
-
-
-def whole(path, value):
-    """Written beside its place and renamed."""
-    beside = path.with_suffix(".new")
-    beside.write_text(json.dumps(value) + "\n")
-    os.replace(beside, path)
-
-
-def same_study(out, said):
-    """What was begun with other settings is not mixed with these."""
-    path = out / "study.json"
-    if not path.exists():
-        out.mkdir(parents=True, exist_ok=True)
-        whole(path, said)
-        return
-    before = json.loads(path.read_text())
-    odd = [f"{key} {before.get(key)} then, {said.get(key)} now" for key in sorted(before | said) if before.get(key) != said.get(key)]
-    if odd:
-        sys.exit(f"error: {out} was begun with other settings ({'; '.join(odd)}): choose another --out, or go on with those")
 
 
 def main():
@@ -217,8 +207,7 @@ def main():
     if not args.hilt:
         words.error("--hilt must name the binary")
     args.hilt = str(Path(args.hilt).resolve())
-    version = subprocess.run([args.hilt, "--version"], capture_output=True, text=True, check=True).stdout.split("\n")[0]
-    same_study(args.out, SETTINGS | {"episodes": args.episodes, "hilt": " ".join(version.split()[:2])})
+    same_study(args.out, SETTINGS | {"episodes": args.episodes} | made_with(args.hilt, METHODS))
     with multiprocessing.get_context("spawn").Pool(args.jobs, maxtasksperchild=1) as pool:
         try:
             for _ in pool.imap_unordered(one, jobs):

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import jaco_mujoco
 import matplotlib.pyplot as plt
-import onnxruntime
+from checks import at_least, read_policy, read_starts, refuse
 
 # By key of jaco_mujoco.NOMINAL: what it is called, and its values.
 CURVES = {
@@ -42,15 +42,18 @@ def conditions():
 
 
 def run(args):
-    out = Path(args.out)
-    task = onnxruntime.InferenceSession(args.policy).get_modelmeta().custom_metadata_map["task"]
+    out, task = Path(args.out), read_policy(args.policy)["task"]
+    most = len(read_starts(args.starts, task))
+    if most < args.episodes:
+        print(f"{args.starts} has {most} starts: no more episodes are run under a condition", flush=True)
     about = {"task": task, "policy": hashlib.sha256(Path(args.policy).read_bytes()).hexdigest(), "seed": args.seed}
-    found = json.loads(out.read_text()) if out.exists() else {**about, "results": []}
+    found = read_found(out) if out.exists() else {**about, "results": []}
     if any(found[key] != value for key, value in about.items()):
         raise SystemExit(f"error: {out} is of another policy or seed: remove it, or give another --out")
     found["name"] = args.name
     for condition in conditions():
-        episodes = args.episodes if not condition else min(args.episodes, args.curve_episodes)
+        # No more than there are starts: what ran them all is complete.
+        episodes = min(most, args.episodes, args.curve_episodes if condition else args.episodes)
         if episodes == 0 or any(r["condition"] == condition and r["episodes"] >= episodes for r in found["results"]):
             continue
         rows = jaco_mujoco.evaluate(args.policy, args.starts, args.robot, condition, episodes, args.seed, args.jobs)
@@ -64,14 +67,25 @@ def run(args):
         fresh.replace(out)
 
 
-def success(found, condition):
-    """Share of the episodes solved, in per cent."""
-    (result,) = [r for r in found["results"] if r["condition"] == condition]
-    return 100 * result["successes"] / result["episodes"]
+def read_found(path):
+    """What `run` has left."""
+    try:
+        found = json.loads(Path(path).read_text())
+    except (OSError, ValueError) as why:
+        refuse(path, f"cannot be read as results: {why}; curves.py run --out {path} makes them")
+    if not isinstance(found, dict) or not found.keys() >= {"task", "policy", "seed", "name", "results"}:
+        refuse(path, "holds no results of curves.py run; give a file that its --out has named")
+    return found
+
+
+def points(found, key):
+    """The values along a curve that were run, each with the share of the episodes solved [%]; the nominal value's is that of the nominal arm."""
+    at = [(value, {} if value == jaco_mujoco.NOMINAL[key] else {key: value}) for value in CURVES[key][1]]
+    return [(value, 100 * r["successes"] / r["episodes"]) for value, condition in at for r in found["results"] if r["condition"] == condition]
 
 
 def plot(args):
-    runs = [json.loads(Path(path).read_text()) for path in args.results]
+    runs = [read_found(path) for path in args.results]
     tasks = list(dict.fromkeys(found["task"] for found in runs))
     names = list(dict.fromkeys(found["name"] for found in runs))
     plt.rcParams.update({"svg.hashsalt": "hilt", "svg.fonttype": "none", "font.size": 8, "font.family": "sans-serif"})
@@ -79,12 +93,12 @@ def plot(args):
     figure, axes = plt.subplots(len(tasks), len(CURVES), figsize=size, sharey=True, layout="constrained", squeeze=False)
     for row, task in zip(axes, tasks):
         row[0].set_ylabel(f"{task}\nsolved [%]")
-        for axis, (key, (label, values)) in zip(row, CURVES.items()):
+        for axis, (key, (label, _)) in zip(row, CURVES.items()):
             axis.axvline(jaco_mujoco.NOMINAL[key] * SCALE.get(key, 1), color="0.85", linewidth=1, zorder=0)
             for found in (found for found in runs if found["task"] == task):
-                points = [success(found, {} if value == jaco_mujoco.NOMINAL[key] else {key: value}) for value in values]
+                run_at = points(found, key)
                 style = LINES[names.index(found["name"]) % len(LINES)]
-                axis.plot([value * SCALE.get(key, 1) for value in values], points, markersize=3, label=found["name"], **style)
+                axis.plot([v * SCALE.get(key, 1) for v, _ in run_at], [share for _, share in run_at], markersize=3, label=found["name"], **style)
             axis.set(ylim=(-4, 104), xlabel=label if task == tasks[-1] else None)
     lines = {text: line for axis in axes.flat for line, text in zip(*axis.get_legend_handles_labels())}
     figure.legend(lines.values(), lines.keys(), loc="outside upper center", ncols=4, frameon=False)
@@ -99,10 +113,10 @@ def main():
     one.add_argument("--starts", required=True)
     one.add_argument("--robot", required=True)
     one.add_argument("--name", required=True, help="what the line is called in the picture")
-    one.add_argument("--episodes", type=int, default=500, help="on the nominal arm")
-    one.add_argument("--curve-episodes", type=int, default=50, help="for each point of a curve, and with everything drawn at once; 0: none")
-    one.add_argument("--seed", type=int, default=0)
-    one.add_argument("--jobs", type=int, default=os.cpu_count())
+    one.add_argument("--episodes", type=at_least(0), default=500, help="on the nominal arm")
+    one.add_argument("--curve-episodes", type=at_least(0), default=50, help="for each point of a curve, and with everything drawn at once; 0: none")
+    one.add_argument("--seed", type=at_least(0), default=0)
+    one.add_argument("--jobs", type=at_least(1), default=os.cpu_count())
     one.add_argument("--out", required=True, help="FILE.json")
     one.set_defaults(run=run)
     picture = commands.add_parser("plot", help="draw what runs have found")

@@ -8,7 +8,6 @@ import argparse
 import json
 import multiprocessing
 import os
-import tomllib
 from collections import deque
 from pathlib import Path
 
@@ -16,7 +15,7 @@ import dm_control
 import mujoco
 import numpy as np
 import onnxruntime
-import pyarrow.parquet as pq
+from checks import at_least, read_condition, read_policy, read_ready, read_starts
 
 KINOVA = Path(dm_control.__file__).parent / "third_party/kinova"
 ARM = [f"joint_{i}" for i in range(1, 7)]
@@ -187,11 +186,9 @@ def begin(policy, task, ready, starts, condition, horizon, seed):
 
 def evaluate(policy, starts, robot, condition, episodes, seed=0, jobs=os.cpu_count()):
     """Rows of the first `episodes` episodes of `starts` with a policy (ONNX) under a condition (what it leaves out is nominal)."""
-    about = onnxruntime.InferenceSession(policy).get_modelmeta().custom_metadata_map
-    starts = pq.read_table(starts).to_pylist()[:episodes]
-    robot = tomllib.loads(Path(robot).read_text())
-    ready = robot["ready"] + robot["hand"]["opened"]
-    given = (policy, about["task"], ready, starts, NOMINAL | condition, int(about["horizon_steps"]), seed)
+    about = read_policy(policy)
+    starts = read_starts(starts, about["task"])[:episodes]
+    given = (policy, about["task"], read_ready(robot), starts, NOMINAL | condition, int(about["horizon_steps"]), seed)
     with multiprocessing.Pool(jobs, begin, given) as pool:
         return pool.map(episode, range(len(starts)), chunksize=5)
 
@@ -201,15 +198,13 @@ def main():
     parser.add_argument("policy", help="a policy of pick-up, pick-and-place or stack as `hilt export onnx` writes it")
     parser.add_argument("--starts", required=True, help="NAME.episodes.parquet of `hilt evaluate --out NAME.json`")
     parser.add_argument("--robot", required=True, help="pipelines/robots/jaco.toml: the pose in which episodes begin")
-    parser.add_argument("--episodes", type=int, default=500)
-    parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--jobs", type=int, default=os.cpu_count())
+    parser.add_argument("--episodes", type=at_least(1), default=500, help="no more than there are starts")
+    parser.add_argument("--seed", type=at_least(0), default=0)
+    parser.add_argument("--jobs", type=at_least(1), default=os.cpu_count())
     parser.add_argument("--set", nargs="*", default=[], metavar="KEY=VALUE", help=f"a condition: {', '.join(NOMINAL)}")
     parser.add_argument("--out", help="write a row an episode to this JSON file")
     args = parser.parse_args()
-    condition = {key: json.loads(value) for key, _, value in (text.partition("=") for text in args.set)}
-    if unknown := condition.keys() - NOMINAL.keys():
-        parser.error(f"--set: there is no {', '.join(unknown)}; there are {', '.join(NOMINAL)}")
+    condition = read_condition(args.set, NOMINAL)
     rows = evaluate(args.policy, args.starts, args.robot, condition, args.episodes, args.seed, args.jobs)
     print(f"{sum(row['success'] for row in rows)} of {len(rows)} solved, {condition or 'nominal'}")
     if args.out:

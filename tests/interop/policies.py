@@ -2,7 +2,9 @@
 
 Usage: policies.py RUNS HILT, where each directory RUNS/policies/NAME holds policy.safetensors, policy.onnx and rollouts (the recordings of hilt
 evaluate --record), as tests/interop/policies.sh leaves them. NumPy runs the weights (python/examples/run_policy.py and the code of
-docs/run-a-policy.md), onnxruntime the ONNX files; the checker of onnx and Netron open them. Exits 1 at the first thing that is not as promised.
+docs/run-a-policy.md), onnxruntime the ONNX files; the checker of onnx and Netron open them. RUNS/foreign/NAME, a policy of the dataset
+fixtures/foreign/NAME, has no recordings: its actions are those that hilt serve answers to random states. Exits 1 at the first thing that is not as
+promised.
 """
 
 import contextlib
@@ -23,6 +25,7 @@ import netron.onnx
 import numpy as np
 import onnx
 import onnxruntime
+import pyarrow.parquet as pq
 from mcap.reader import make_reader
 from mcap_protobuf.decoder import DecoderFactory
 
@@ -30,6 +33,8 @@ ROOT = Path(__file__).resolve().parents[2]
 # Largest difference of an action [rad/s, m/s], and the states of each policy that it holds for.
 TOLERANCE = 1e-5
 STATES = 10_000
+# How far random states go beyond those of a dataset, in parts of their range.
+BEYOND = 0.2
 
 
 def check(holds, what):
@@ -68,6 +73,23 @@ def rollouts(directory, layout):
                     states.append(row(layout, scene, message))
                     actions.append(message.commanded_rad_s)
     return np.array(states, np.float32), np.array(actions, np.float32)
+
+
+def served(policy_file, data, layout, hilt):
+    """Random states near those of a dataset of another program, and what hilt serve answers to them."""
+    spans = {span["name"]: len(span["entries"]) for span in layout["state"]}
+    rows = [row for path in sorted(data.glob("data/*/*.parquet")) for row in pq.read_table(path, columns=list(spans)).to_pylist()]
+    rows = np.array([np.concatenate([row[name] for name in spans]) for row in rows])
+    low, high = rows.min(axis=0), rows.max(axis=0)
+    more = BEYOND * (high - low)
+    states = np.random.default_rng(0).uniform(low - more, high + more, (STATES, len(low))).astype(np.float32)
+    cuts = np.cumsum(list(spans.values()))[:-1]
+    lines = [json.dumps({name: part.tolist() for name, part in zip(spans, np.split(state, cuts))}) for state in states]
+    command = [hilt, "serve", str(policy_file), "--stdio", "--quiet"]
+    done = subprocess.run(command, input="\n".join(lines) + "\n", capture_output=True, text=True)
+    check(done.returncode == 0, f"{policy_file}: hilt serve --stdio: {done.stderr}")
+    # The first line says what is served.
+    return states, np.array([json.loads(line)["actions"][0] for line in done.stdout.splitlines()[1:]], np.float32)
 
 
 def example():
@@ -136,29 +158,35 @@ def worst(found, actions, what):
     return difference
 
 
+def compare(directory, states_and_actions, hilt):
+    """Runs the policy of a directory in every way, on the states that this finds for its file and layout."""
+    policy = example().Policy(directory / "policy.safetensors")
+    states, actions = states_and_actions(policy.layout)
+    check(len(states) >= STATES, f"{directory}: {len(states)} states, {STATES} are needed")
+    check_file(directory / "policy.onnx", policy.meta)
+    session = onnxruntime.InferenceSession(directory / "policy.onnx")
+    by_onnx = worst(session.run(["action"], {"state": states})[0], actions, f"{directory}: onnxruntime")
+    one = np.concatenate([session.run(["action"], {"state": states[i : i + 1]})[0] for i in range(100)])
+    worst(one, actions[:100], f"{directory}: onnxruntime, row by row")
+    by_numpy = worst(policy.act(states), actions, f"{directory}: run_policy.py")
+    print(f"  {directory.name}: {len(states)} states, largest difference {by_onnx:.1e} onnxruntime, {by_numpy:.1e} NumPy")
+    with tempfile.TemporaryDirectory() as place:
+        shutil.copy(directory / "policy.safetensors", place)
+        names = page(place, hilt)
+        worst(names["act"](states), actions, f"{directory}: docs/run-a-policy.md")
+        worst(names["session"].run(None, {"state": states})[0], actions, f"{directory}: ONNX of docs/run-a-policy.md")
+
+
 def main():
     runs, hilt = Path(sys.argv[1]), sys.argv[2]
-    directories = sorted((runs / "policies").iterdir())
-    check(directories, f"no policies in {runs}/policies")
-    numpy_policy, pages = example().Policy, 0
-    for directory in directories:
-        policy = numpy_policy(directory / "policy.safetensors")
-        states, actions = rollouts(directory / "rollouts", policy.layout)
-        check(len(states) >= STATES, f"{directory}: {len(states)} recorded states, {STATES} are needed")
-        check_file(directory / "policy.onnx", policy.meta)
-        session = onnxruntime.InferenceSession(directory / "policy.onnx")
-        by_onnx = worst(session.run(["action"], {"state": states})[0], actions, f"{directory}: onnxruntime")
-        one = np.concatenate([session.run(["action"], {"state": states[i : i + 1]})[0] for i in range(100)])
-        worst(one, actions[:100], f"{directory}: onnxruntime, row by row")
-        by_numpy = worst(policy.act(states), actions, f"{directory}: run_policy.py")
-        print(f"  {directory.name}: {len(states)} states, largest difference {by_onnx:.1e} onnxruntime, {by_numpy:.1e} NumPy")
-        with tempfile.TemporaryDirectory() as place:
-            shutil.copy(directory / "policy.safetensors", place)
-            names = page(place, hilt)
-            worst(names["act"](states), actions, f"{directory}: docs/run-a-policy.md")
-            worst(names["session"].run(None, {"state": states})[0], actions, f"{directory}: ONNX of docs/run-a-policy.md")
-            pages += 1
-    print(f"all act alike; docs/run-a-policy.md ran over {pages} policies")
+    own, foreign = (sorted((runs / kind).iterdir()) for kind in ("policies", "foreign"))
+    check(own and foreign, f"no policies in {runs}/policies or {runs}/foreign")
+    for directory in own:
+        compare(directory, lambda layout: rollouts(directory / "rollouts", layout), hilt)
+    for directory in foreign:
+        data = ROOT / "fixtures/foreign" / directory.name
+        compare(directory, lambda layout: served(directory / "policy.safetensors", data, layout, hilt), hilt)
+    print(f"all act alike; docs/run-a-policy.md ran over {len(own) + len(foreign)} policies")
 
 
 if __name__ == "__main__":

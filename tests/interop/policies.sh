@@ -1,6 +1,7 @@
 #!/bin/sh
 # Trains a tiny policy of every task and kind of network, exports it and records 10,000 states and actions of it. Usage: tests/interop/policies.sh HILT RUNS
 # RUNS/TASK holds dataset and dynamics of each task (make smoke leaves them); the policies go to RUNS/policies/NAME. Another robot's are made here.
+# Those of other programs' datasets, for which there is no simulator to record in, go to RUNS/foreign/NAME.
 set -eu
 [ $# -eq 2 ] || { echo "usage: $0 HILT RUNS" >&2; exit 2; }
 hilt=$1 runs=$2
@@ -14,7 +15,7 @@ policy() {
     out=$runs/policies/$1 method=$2 flags=$3 settings=$4
     case $method in
         ppo) learns= ;;
-        bc-rl) learns="--dataset $from/dataset" ;;
+        bc | bc-rl) learns="--dataset $from/dataset" ;;
         *) learns="--dataset $from/dataset --dynamics $from/dynamics.safetensors" ;;
     esac
     echo "  $1"
@@ -39,7 +40,10 @@ policy pick-up-ppo ppo "--task pick-up" "$ppo"
 # it solves the task, in some 90 steps
 episodes=120
 policy pick-up-bc-rl bc-rl "--task pick-up" "$ppo"
-episodes=80
+# As long as a user trains: weights of another size than after 50 updates.
+episodes=130 few=$tiny tiny=
+policy pick-up-bc bc "--task pick-up" ""
+episodes=80 tiny=$few
 for robot in panda ur5e "$root/fixtures/robots/five.toml"; do
     name=$(basename "$robot" .toml)
     from=$runs/$name-stack flags="--task stack --robot $robot"
@@ -48,4 +52,10 @@ for robot in panda ur5e "$root/fixtures/robots/five.toml"; do
     "$hilt" convert $flags --quiet --allow-dropped --recordings "$from/recordings" --out "$from/dataset"
     "$hilt" pretrain $flags --quiet --dataset "$from/dataset" --set pretrain.epochs=2 --out "$from/dynamics.safetensors"
     policy "$name-stack" hil "$flags" "train.features=fk-near"
+done
+for data in lerobot pandas; do
+    out=$runs/foreign/$data
+    echo "  $data"
+    "$hilt" train --quiet --method bc --dataset "$root/fixtures/foreign/$data" --out "$out/policy.safetensors"
+    "$hilt" export onnx "$out/policy.safetensors" --out "$out/policy.onnx" --quiet
 done

@@ -1,21 +1,22 @@
-"""hilt's wire from Python: the Gymnasium environment, served policies, and openpi's packing to the letter.
+"""hilt's wire from Python: the Gymnasium environment, served policies, the demonstrator, and the examples that need no more than these.
 
-Usage: wire.py HILT RUNS, where RUNS/pick-up holds what `make all TASK=pick-up` leaves. It installs python/hilt_gym of this checkout with pip into
-the running Python. Exits 1 at the first thing that is not as promised.
+Usage: wire.py HILT RUNS, where RUNS/policies/pick-up-bc-rl is what tests/interop/policies.sh leaves. It installs python/hilt_gym of this checkout and
+openpi's client with pip into the running Python. Exits 1 at the first thing that is not as promised.
 """
 
-import functools
 import json
+import os
+import re
+import shutil
 import subprocess
 import sys
 import tempfile
-import time
 from pathlib import Path
 
-HERE = Path(__file__).resolve().parent
-PACKAGE = HERE.parent.parent / "python" / "hilt_gym"
+PYTHON = Path(__file__).resolve().parents[2] / "python"
 TASK = "pick-up"
-EPISODES = 4
+EPISODES, SEED = 6, 3
+HORIZON = 300
 
 
 def check(holds, what):
@@ -24,25 +25,45 @@ def check(holds, what):
 
 
 def install():
-    # pip builds beside what it installs: not in the checkout.
-    with tempfile.TemporaryDirectory() as copy:
-        subprocess.run(["cp", "-r", str(PACKAGE), copy], check=True)
-        command = [sys.executable, "-m", "pip", "install", "--quiet", "--disable-pip-version-check", f"{copy}/hilt_gym"]
-        subprocess.run(command, check=True)
+    pip = [sys.executable, "-m", "pip", "install", "--quiet", "--disable-pip-version-check"]
+    # pip builds beside what it installs: not in the checkout, and without an earlier build, whose old files it would take for new ones.
+    with tempfile.TemporaryDirectory() as place:
+        copy = shutil.copytree(PYTHON / "hilt_gym", Path(place) / "hilt_gym", ignore=shutil.ignore_patterns("build", "*.egg-info"))
+        subprocess.run([*pip, str(copy)], check=True)
+    # It asks for NumPy before 2, of which it needs nothing; LeRobot needs 2.
+    subprocess.run([*pip, "--no-deps", "openpi-client==0.1.2"], check=True)
 
 
-def evaluate(hilt, directory, policy, horizon):
-    """Summary and rows of the episodes of `hilt evaluate`."""
+def evaluate(hilt, directory, policy, horizon, *more, task=TASK):
+    """Summary and rows of the episodes of `hilt evaluate`, some of which are solved."""
     import pyarrow.parquet as pq
 
     out = Path(directory) / "evaluation.json"
-    fixed = ["evaluate", "--task", TASK, "--episodes", str(EPISODES), "--seed", "3", "--quiet", "--out", str(out)]
-    subprocess.run([hilt, *fixed, "--set", f"evaluate.horizon_steps={horizon}", "--policy", policy], check=True, stdout=subprocess.DEVNULL)
+    fixed = ["evaluate", "--task", task, "--episodes", str(EPISODES), "--seed", str(SEED), "--quiet", "--out", str(out)]
+    settings = ["--set", f"evaluate.horizon_steps={horizon}", "--policy", policy, *more]
+    subprocess.run([hilt, *fixed, *settings], check=True, stdout=subprocess.DEVNULL)
     rows = pq.read_table(out.with_suffix(".episodes.parquet")).to_pylist()
+    check(any(row["success"] for row in rows), f"{policy}: no episode is solved; that those of others are the same says little then")
     summary = json.loads(out.read_text())
     for said in ("hilt", "differs_from_training"):  # Not of the episodes.
         summary.pop(said, None)
     return summary, rows
+
+
+def solved(rows):
+    return f"{sum(row['success'] for row in rows)} of {len(rows)} solved"
+
+
+def play(env, act, row):
+    """Acts in an episode of the environment, by what is seen and the step's number; it must end as this one of `hilt evaluate`."""
+    observation, _ = env.reset()
+    over, steps, earned = False, 0, 0.0
+    while not over:
+        observation, reward, terminated, truncated, info = env.step(act(observation, steps))
+        over, steps, earned = terminated or truncated, steps + 1, earned + reward
+    found = (info["episode"], info["success"], info["failure"] or "", steps, info["return"])
+    check(found == tuple(row[k] for k in ("episode", "success", "failure", "steps", "reward")), f"episode {found}, natively {row}")
+    check(abs(earned - info["return"]) < 1e-9, f"rewards add up to {earned}, not {info['return']}")
 
 
 def check_environment(hilt, policy_file, directory):
@@ -55,32 +76,27 @@ def check_environment(hilt, policy_file, directory):
             check_env(env, skip_render_check=True)
     print("check_env passes, with a Dict and flat")
 
-    horizon = 60
-    _, native = evaluate(hilt, directory, policy_file, horizon)
-    with PolicyClient(policy_file, binary=hilt) as policy, HiltEnv(TASK, seed=3, horizon_steps=horizon, binary=hilt) as env:
+    _, native = evaluate(hilt, directory, policy_file, HORIZON)
+    with PolicyClient(policy_file, binary=hilt) as policy, HiltEnv(TASK, seed=SEED, horizon_steps=HORIZON, binary=hilt) as env:
+
+        def act(observation, _):
+            answer = policy.infer(observation)
+            return answer.get("unlimited_actions", answer["actions"])[0]
+
         for row in native:
-            observation, info = env.reset()
-            over, steps, earned = False, 0, 0.0
-            while not over:
-                answer = policy.infer(observation)
-                action = answer.get("unlimited_actions", answer["actions"])[0]
-                observation, reward, terminated, truncated, info = env.step(action)
-                over, steps, earned = terminated or truncated, steps + 1, earned + reward
-            found = (info["episode"], info["success"], info["failure"] or "", steps, info["return"])
-            check(found == tuple(row[k] for k in ("episode", "success", "failure", "steps", "reward")), f"episode {found}, natively {row}")
-            check(abs(earned - info["return"]) < 1e-9, f"rewards add up to {earned}, not {info['return']}")
-        first, _ = env.reset(seed=3)
-        again, _ = env.reset(seed=3, options={"episode": 0})
-        other, _ = env.reset(seed=3, options={"episodes": "training"})
+            play(env, act, row)
+        first, _ = env.reset(seed=SEED)
+        again, _ = env.reset(seed=SEED, options={"episode": 0})
+        other, _ = env.reset(seed=SEED, options={"episodes": "training"})
         same = [all(np.array_equal(first[key], seen[key]) for key in first) for seen in (again, other)]
         check(same == [True, False], f"the same episode, another for training: {same}")
-    print(f"{EPISODES} episodes through Gymnasium are those of hilt evaluate")
+    print(f"{EPISODES} episodes through Gymnasium are those of hilt evaluate, {solved(native)}")
 
 
 def check_policy_server(hilt, policy_file, directory):
     from hilt_gym import PolicyClient, PolicyServer
 
-    summary, rows = evaluate(hilt, directory, policy_file, 40)
+    summary, rows = evaluate(hilt, directory, policy_file, HORIZON)
     began = []
     with PolicyClient(policy_file, binary=hilt) as inner:
 
@@ -95,69 +111,84 @@ def check_policy_server(hilt, policy_file, directory):
             return act
 
         with PolicyServer(make=make) as server:
-            check(evaluate(hilt, directory, server.address, 40) == (summary, rows), "a policy served from Python has other episodes")
+            check(evaluate(hilt, directory, server.address, HORIZON) == (summary, rows), "a policy served from Python has other episodes")
     check(len(began) == EPISODES, f"{len(began)} conversations for {EPISODES} episodes")
-    print("a policy that Python serves has the same episodes")
+    print(f"a policy that Python serves has the same episodes, {solved(rows)}")
 
 
-def check_openpi(hilt, policy_file):
-    """The packing of openpi-client's msgpack_numpy, written out: what a client of openpi's sends and reads."""
-    import msgpack
+def recorded(path):
+    """States of the joints and commands of a recording, step by step."""
+    from mcap.reader import make_reader
+    from mcap_protobuf.decoder import DecoderFactory
+
+    with path.open("rb") as stream:
+        reader = make_reader(stream, decoder_factories=[DecoderFactory()])
+        steps = [step for _, _, _, step in reader.iter_decoded_messages(topics=["/hilt/step"]) if not step.final_state]
+    return [[*step.q_rad, *step.dq_rad_s] for step in steps], [step.commanded_rad_s for step in steps]
+
+
+def check_planner(hilt, task, settings, directory):
+    """No observation tells the demonstrator enough. What it commanded, given again step by step over the wire, must have its episodes."""
     import numpy as np
-    from hilt_gym import HiltProcess
-    from websockets.sync.client import connect
+    from hilt_gym import HiltEnv, PolicyServer
 
-    def pack_array(value):
-        if isinstance(value, np.ndarray):
-            return {b"__ndarray__": True, b"data": value.tobytes(), b"dtype": value.dtype.str, b"shape": value.shape}
-        if isinstance(value, np.generic):
-            return {b"__npgeneric__": True, b"data": value.item(), b"dtype": value.dtype.str}
-        return value
+    settings = [word for setting in settings for word in ("--set", setting)]
+    record = Path(directory) / "recordings"
+    summary, rows = evaluate(hilt, directory, "planner", HORIZON, *settings, "--record", str(record), task=task)
+    native = [recorded(record / f"episode-{row['episode']:05d}.mcap") for row in rows]
+    with HiltEnv(task, seed=SEED, horizon_steps=HORIZON, binary=hilt, arguments=settings) as env:
+        for row, (states, commands) in zip(rows, native):
 
-    def unpack_array(value):
-        if b"__ndarray__" in value:
-            return np.ndarray(buffer=value[b"data"], dtype=np.dtype(value[b"dtype"]), shape=value[b"shape"])
-        if b"__npgeneric__" in value:
-            return np.dtype(value[b"dtype"]).type(value[b"data"])
-        return value
+            def act(observation, step):
+                where = f"{task}, episode {row['episode']}, step {step}"
+                check(step < len(commands), f"{where}: natively it is over")
+                check(np.array_equal(observation["observation.state"], np.float32(states[step])), f"{where}: another state")
+                return np.float32(commands[step])
 
-    pack = msgpack.Packer(default=pack_array).pack
-    unpack = functools.partial(msgpack.unpackb, object_hook=unpack_array)
-    with HiltProcess("serve", policy_file, binary=hilt) as server:
-        with connect(server.address, compression=None, max_size=None) as socket:
-            about = unpack(socket.recv())
-            check(about["task"] == TASK and about["period_s"] == 0.05, f"metadata {about}")
-            observation = {key: np.zeros(len(names)) for key, names in about["keys"].items()}
-            observation |= {"prompt": "do it", "image": np.zeros((224, 224, 3), np.uint8), "gripper": np.float32(0.5)}
-            socket.send(pack(observation))
-            first = unpack(socket.recv())
-            check(first["actions"].shape == (1, len(about["actions"])) and first["actions"].dtype == np.float32, f"answer {first}")
-            check(first["server_timing"]["infer_ms"] >= 0.0, f"timing {first}")
-            socket.send(pack({"image": observation["image"]}))
-            refusal = socket.recv()
-            check(isinstance(refusal, str) and "observation.state" in refusal, f"refusal {refusal}")
-            pickled = {b"__ndarray__": True, b"data": b"\x80\x04.", b"dtype": "|O", b"shape": (1,)}
-            socket.send(msgpack.packb({"observation.state": pickled}))
-            check("|O" in socket.recv(), "an array of objects is not refused")
-            times = []
-            for _ in range(2000):
-                began = time.perf_counter()
-                socket.send(pack(observation))
-                again = unpack(socket.recv())
-                times.append(1e3 * (time.perf_counter() - began))
-            check(np.array_equal(again["actions"], first["actions"]), "the same observation has another action")
-    p50, p99 = np.percentile(times, [50, 99])
-    print(f"openpi's packing is spoken; with a picture aboard p50 {p50:.3f} ms, p99 {p99:.3f} ms")
+            play(env, act, row)
+    with PolicyServer(lambda seen: native[seen["episode_index"]][1][seen["frame_index"]]) as server:
+        served = evaluate(hilt, directory, server.address, HORIZON, *settings, task=task)
+    check(served == (summary, rows), f"{task}: the demonstrator's commands, served from Python, have other episodes")
+    print(f"{task}: the demonstrator's commands have its episodes over the wire, {solved(rows)}")
+
+
+def check_examples(hilt, policy_file, directory):
+    # Networks so small are no faster on several threads, and much slower beside other programs.
+    one_thread = {**os.environ, "OMP_NUM_THREADS": "1"}
+
+    def example(name, *words):
+        command = [sys.executable, str(PYTHON / "examples" / name), *words, "--hilt", hilt]
+        done = subprocess.run(command, env=one_thread, capture_output=True, text=True)
+        check(done.returncode == 0, f"{name}: {done.stderr}")
+        return done.stdout
+
+    # Without a horizon it is the policy's own.
+    _, rows = evaluate(hilt, directory, policy_file, 0)
+    said = example("evaluate_policy.py", TASK, policy_file, "--episodes", str(EPISODES), "--seed", str(SEED)).splitlines()
+    lines = [f"episode {row['episode']}: {'success' if row['success'] else row['failure']} in {row['steps']} steps" for row in rows]
+    check(said == [*lines, f"{TASK}: success {sum(row['success'] for row in rows)} of {EPISODES}"], f"evaluate_policy.py: {said}")
+    # One rollout of PPO and what it learns from it: that it runs is all that is asked.
+    said = example("train_sb3.py", TASK, "--steps", "1024", "--episodes", "2")
+    check(re.search(rf"^{TASK}: success [0-2] of 2, mean return [\d.]+$", said, re.MULTILINE), f"train_sb3.py: {said}")
+    print("evaluate_policy.py says what hilt evaluate says; train_sb3.py trains")
 
 
 def main():
     hilt, runs = sys.argv[1:]
     install()
-    policy_file = str(Path(runs) / TASK / "policy.safetensors")
-    with tempfile.TemporaryDirectory() as directory:
-        check_environment(hilt, policy_file, directory)
-        check_policy_server(hilt, policy_file, directory)
-    check_openpi(hilt, policy_file)
+    policy_file = str(Path(runs) / "policies" / f"{TASK}-bc-rl" / "policy.safetensors")
+    # So much that the demonstrator fails in some.
+    noise = ["simulate.noise_variance=0.05", "simulate.pulses.probability=0.1", "evaluate.pulses=true"]
+    checks = [
+        lambda directory: check_environment(hilt, policy_file, directory),
+        lambda directory: check_policy_server(hilt, policy_file, directory),
+        lambda directory: check_planner(hilt, TASK, noise, directory),
+        lambda directory: check_planner(hilt, "stack", [], directory),
+        lambda directory: check_examples(hilt, policy_file, directory),
+    ]
+    for one in checks:
+        with tempfile.TemporaryDirectory() as directory:
+            one(directory)
 
 
 if __name__ == "__main__":

@@ -2,6 +2,7 @@
 
 import hmac
 import http
+import socket
 import threading
 import time
 
@@ -12,6 +13,35 @@ from websockets.sync.server import serve
 from .wire import MOST_BYTES, pack, unpack
 
 LOOPBACK = ("127.0.0.1", "::1", "localhost")
+# As hilt takes them; openpi's client sends the second.
+SCHEMES = ("bearer", "api-key")
+MOST_CALLERS = 64  # at the same time who have not yet said who they are
+BUSY = b"too many call at once; try again later\n"
+TURN_AWAY_S = 1.0  # how long who is turned away may take to ask and to hear it; nobody waits for that
+REQUEST_BYTES = 8 << 10
+
+
+def admits(token, header):
+    """Whether the value of an `Authorization` header holds the token; told in constant time."""
+    scheme, _, said = header.strip().partition(" ")
+    same = hmac.compare_digest(said.strip().encode(errors="surrogateescape"), token.encode())
+    return same and scheme.lower() in SCHEMES
+
+
+def turn_away(connection):
+    """Says that there is no room and hangs up. What is asked is taken first: otherwise the system may drop the answer unheard."""
+    head = f"HTTP/1.1 503 Service Unavailable\r\nContent-Type: text/plain\r\nContent-Length: {len(BUSY)}\r\nConnection: close\r\n\r\n"
+    connection.settimeout(TURN_AWAY_S)
+    try:
+        connection.recv(REQUEST_BYTES)
+    except OSError:  # Who says nothing is told all the same.
+        pass
+    try:
+        connection.sendall(head.encode() + BUSY)
+        connection.shutdown(socket.SHUT_RDWR)
+    except OSError:  # Who has gone does not want to know.
+        pass
+    connection.close()
 
 
 class PolicyServer:
@@ -19,30 +49,54 @@ class PolicyServer:
 
     ``function`` takes an observation, a dict with ``observation.state``, ``observation.environment_state``, ``task``, ``episode_index`` and
     ``frame_index``, and returns one action or several in rows. A policy that remembers something is given as ``make`` instead: it is called for
-    each episode, which is a conversation of its own, and returns such a function. One call runs at a time.
+    each episode, which is a conversation of its own, and returns such a function. One call runs at a time. No more than ``connections`` are
+    open at the same time; others are turned away with 503. Who has not shown the token takes no place.
     """
 
-    def __init__(self, function=None, *, make=None, metadata=None, host="127.0.0.1", port=0, token=None):
+    def __init__(self, function=None, *, make=None, metadata=None, host="127.0.0.1", port=0, token=None, connections=16):
         if (function is None) == (make is None):
             raise ValueError("give a function, or make, which returns one for each episode")
         if host not in LOOPBACK and not token:
             raise ValueError(f"{host}: other machines could reach it; give a token that clients must send")
+        if connections < 1:
+            raise ValueError(f"connections is {connections}; at least 1 is needed")
         self._make = make or (lambda: function)
         self._metadata, self._token, self._lock = dict(metadata or {}), token, threading.Lock()
         self._server = serve(
             self._converse, host, port, compression=None, max_size=MOST_BYTES, process_request=self._admit, origins=[None]
         )
+        self._seats, self._threads = threading.BoundedSemaphore(connections), threading.BoundedSemaphore(connections + MOST_CALLERS)
+        self._handle, self._mine = self._server.handler, threading.local()
+        self._server.handler = self._accept
         name, port = self._server.socket.getsockname()[:2]
         self.address = f"ws://[{name}]:{port}" if ":" in name else f"ws://{name}:{port}"
         self._thread = threading.Thread(target=self._server.serve_forever, name="policy server", daemon=True)
         self._thread.start()
 
+    def _accept(self, connection, address):
+        """Holds a conversation from its first byte to its last, in a thread of its own."""
+        if not self._threads.acquire(blocking=False):
+            turn_away(connection)
+            # The library forgets its thread there; a socket that is closed ends it at once.
+            self._handle(connection, address)
+            return
+        self._mine.seated = False
+        try:
+            self._handle(connection, address)
+        finally:
+            if self._mine.seated:
+                self._seats.release()
+            self._threads.release()
+
     def _admit(self, connection, request):
         if request.path == "/healthz":
             return connection.respond(http.HTTPStatus.OK, "OK\n")
-        said = request.headers.get("Authorization", "")
-        if self._token and not hmac.compare_digest(said.encode(), f"Bearer {self._token}".encode()):
+        said = next(iter(request.headers.get_all("Authorization")), "")
+        if self._token and not admits(self._token, said):
             return connection.respond(http.HTTPStatus.UNAUTHORIZED, "send the token: Authorization: Bearer TOKEN\n")
+        self._mine.seated = self._seats.acquire(blocking=False)
+        if not self._mine.seated:
+            return connection.respond(http.HTTPStatus.SERVICE_UNAVAILABLE, "all connections are taken; try again later\n")
         return None
 
     def _converse(self, socket):
@@ -63,7 +117,9 @@ class PolicyServer:
             pass
 
     def _answer(self, act, message):
-        observation = unpack(message)
+        observation = unpack(message) if isinstance(message, bytes) else message
+        if not isinstance(observation, dict):
+            raise ValueError(f"the message is of type {type(observation).__name__}; it must be a map in msgpack")
         if "reset" in observation:
             return {"reset": True}
         with self._lock:
@@ -92,8 +148,8 @@ class PolicyServer:
         self.close()
 
 
-def serve_policy(function=None, *, make=None, metadata=None, host="127.0.0.1", port=8000, token=None):
+def serve_policy(function=None, *, make=None, metadata=None, host="127.0.0.1", port=8000, token=None, connections=16):
     """Serves a policy until Ctrl-C; the arguments are those of PolicyServer."""
-    server = PolicyServer(function, make=make, metadata=metadata, host=host, port=port, token=token)
+    server = PolicyServer(function, make=make, metadata=metadata, host=host, port=port, token=token, connections=connections)
     print(server.address, flush=True)
     server.wait()
