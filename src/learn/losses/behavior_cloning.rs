@@ -80,6 +80,9 @@ impl Workspace {
 
 /// Algorithm 2 over a batch in whose states the policy has `acted`: L_BC with its gradient, and d_conv. `rng` draws the samples
 /// a_t ~ pi_theta(s_t^E) where the settings ask for them; p_t always comes from the mean unless it is the sampled density.
+///
+/// # Panics
+/// When the policy has acted in another number of states.
 pub fn behavior_cloning<'a>(
     acted: &Acted,
     batch: Batch,
@@ -89,6 +92,7 @@ pub fn behavior_cloning<'a>(
 ) -> (&'a PolicyLoss, f64) {
     let (rows, Workspace { loss, parts, noise, residual2 }) = (batch.rows.len(), work);
     let dim = residual2.len();
+    assert_eq!(acted.mean().len(), rows * dim, "the policy has acted in other states");
     let sampled = choices.action == ActionChoice::Sample || choices.convergence == Convergence::SampledDensity;
     draw_noise(sampled, rows * dim, rng, noise);
     loss.begin(rows);

@@ -1,4 +1,4 @@
-//! The losses and their gradients. None needs another to have been computed before.
+//! The losses and their gradients. Those of the policy begin where it has [`Acted`] in the states of the demos; none needs another.
 
 mod acted;
 pub mod behavior_cloning;
@@ -15,4 +15,4 @@ pub use behavior_cloning::behavior_cloning;
 pub use model_loss::ModelLearner;
 pub use offsets::Offsets;
 pub use policy_loss::{Mixture, PolicyLoss};
-pub use state_cloning::state_cloning;
+pub use state_cloning::{StateCloning, state_cloning};

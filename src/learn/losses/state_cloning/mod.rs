@@ -4,12 +4,14 @@
 //! action of a segment is the policy's action in a demo state, which [`Acted`] has.
 
 mod choices;
+mod cloning;
 mod pushes;
 mod rollout;
 mod segments;
 mod setting;
 
 pub use choices::Choices;
+pub use cloning::StateCloning;
 pub use pushes::Pushes;
 pub use segments::{Segment, draw_segments};
 pub use setting::Batch;
@@ -41,6 +43,9 @@ impl Workspace {
 
 /// Algorithm 3 over a batch in whose states the policy has `acted`: L_SC with its gradient. The dynamics network is only passed through,
 /// never learned here.
+///
+/// # Panics
+/// When the policy has acted in another number of states.
 pub fn state_cloning<'a>(
     policy: &Policy,
     dynamics: &Dynamics,
@@ -50,6 +55,7 @@ pub fn state_cloning<'a>(
     work: &'a mut Workspace,
 ) -> &'a PolicyLoss {
     let (rows, Workspace { loss, rollouts, sorted }) = (batch.rows.len(), work);
+    assert_eq!(acted.mean().len(), rows * batch.corpus.layout.action_dim(), "the policy has acted in other states");
     let (longest, most_rows) = (batch.corpus.longest(), batch.demos * batch.corpus.longest());
     sorted.clear();
     sorted.reserve(most_rows);

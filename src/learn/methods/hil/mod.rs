@@ -1,5 +1,14 @@
 //! Algorithm 1: hybrid imitation learning. Pure behavior cloning, pure state cloning and a fixed mixture are the same loop with
-//! another alpha.
+//! another alpha. Line by line:
+//!
+//! | Function HIL(D, rho) | here |
+//! |---|---|
+//! | initialise pi_theta and f_phi | [`Hil::new`], [`Dynamics::new`] |
+//! | f_phi = Pretrain_Dynamics_Network(f_phi, D, E) | [`super::pretrain_dynamics`] (Algorithm 4), before: `hilt pretrain` |
+//! | for e = 0 ... E | the stages of [`Hil`] (`stages.rs`), run by [`crate::learn::run`] |
+//! | for i = 0 ... the number of demos: sample d from D | `hybrid_imitation_learning` |
+//! | L_BC, d_conv; L_SC; L_mix; theta <- theta - grad L_mix | [`Hil::update`] |
+//! | return pi_theta | `policy`, as [`crate::learn::run`] selects it |
 
 mod metrics;
 mod stages;
@@ -11,13 +20,13 @@ use super::descent::Descent;
 use super::fine_tuning::FineTuning;
 use super::inputs::Inputs;
 use super::mixing::Mixing;
-use crate::config::{ActionChoice, Alpha, FingerCloning, TrainSettings};
+use crate::config::{Alpha, FingerCloning, TrainSettings};
 use crate::error::{Error, Result};
 use crate::interrupt::Interrupt;
 use crate::learn::limits::{affordable, before_the_first_update};
-use crate::learn::losses::behavior_cloning::{self as bc, draw_noise};
-use crate::learn::losses::state_cloning::{self as sc, Pushes, Segment, draw_segments};
-use crate::learn::losses::{Acted, Offsets, behavior_cloning, state_cloning};
+use crate::learn::losses::behavior_cloning as bc;
+use crate::learn::losses::state_cloning::Segment;
+use crate::learn::losses::{Acted, Offsets, PolicyLoss, StateCloning, behavior_cloning};
 use crate::learn::models::{Corpus, Dynamics, Policy, PolicySamples};
 use crate::learn::run::{EpochMetrics, Mean, Stage};
 use crate::nn::cosine;
@@ -54,11 +63,7 @@ struct Work {
     offsets: Offsets,
     bc_choices: bc::Choices,
     bc_work: bc::Workspace,
-    sc_choices: sc::Choices,
-    sc_work: sc::Workspace,
-    segments: Vec<Segment>,
-    noise: Vec<f32>,
-    pushes: Pushes,
+    sc: StateCloning,
 }
 
 /// What an update of Algorithm 1 reports; NaN where it was not computed.
@@ -94,18 +99,13 @@ impl Hil {
         let most_rows = settings.bc_batch.max(settings.batch * corpus.longest()).min(corpus.rows());
         affordable(most_rows, settings.hidden_layers, units, "train.batch, train.bc_batch or train.hidden_units")?;
         let policy = Policy::new(corpus, &settings, &mut stream(seed, "train.init", 0));
-        let dim = corpus.layout.action_dim();
         let work = Work {
             rows: Vec::with_capacity(most_rows),
             acted: Acted::new(&policy, most_rows),
             offsets: Offsets::new(&settings.randomise, policy.features())?,
             bc_choices: bc::Choices::new(&settings),
-            bc_work: bc::Workspace::new(dim, most_rows),
-            sc_choices: sc::Choices::new(&settings, corpus),
-            sc_work: sc::Workspace::new(dim, most_rows),
-            segments: Vec::with_capacity(most_rows),
-            noise: Vec::with_capacity(most_rows * dim),
-            pushes: Pushes::new(&settings.sc, &corpus.layout, most_rows),
+            bc_work: bc::Workspace::new(corpus.layout.action_dim(), most_rows),
+            sc: StateCloning::new(&settings, corpus, most_rows),
         };
         let per_epoch = per_epoch(corpus, &settings);
         Ok(Hil {
@@ -145,65 +145,58 @@ impl Hil {
         Ok(row)
     }
 
-    /// One update of Algorithm 1 on `demos`, numbers of training demos. With `norms` the lengths of both gradients are measured and
-    /// reported there.
+    /// One update of Algorithm 1 on `demos`, numbers of training demos: d of the paper, of which several may be taken at once. With `norms` the
+    /// lengths of both gradients are measured and reported there.
     ///
     /// # Errors
     /// [`Error::Failed`] when a loss is not a number.
     pub fn update(&mut self, demos: &[usize], learning_rate: f64, norms: Option<&mut EpochMetrics>) -> Result<Update> {
         self.draws += 1;
-        let finite = self.judge();
-        let (corpus, descent, mixing) = (&self.inputs.train, &mut self.descent, &mut self.mixing);
-        let Work { rows, acted, offsets, bc_choices, bc_work, sc_choices, sc_work, segments, noise, pushes } = &mut self.work;
-        corpus.rows_of(demos, rows);
-        let samples = PolicySamples { corpus, policy: &descent.policy };
-        let offsets = offsets.draw(rows.len(), &mut stream(self.seed, OFFSETS, self.draws));
-        acted.forward(samples, rows, Some(offsets)); // pi_theta in the demos' states, where both losses begin
+        let (finite, seed, draws) = (self.judge(), self.seed, self.draws);
+        let rng = |name| stream(seed, name, draws);
+        let Hil { inputs: Inputs { train, .. }, descent, model: f_phi, mixing, work, .. } = self;
+        let Work { rows, acted, offsets, bc_choices, bc_work, sc } = work;
+        train.rows_of(demos, rows);
+        let samples = PolicySamples { corpus: train, policy: &descent.policy };
 
-        // Algorithm 2, Eq. 3-4
-        let mut rng = stream(self.seed, "train.bc", self.draws);
-        let batch = bc::Batch { samples, rows, demos: demos.len() as f64 };
-        let (l_bc, d_conv) = behavior_cloning(acted, batch, bc_choices, &mut rng, bc_work);
+        // pi_theta in the states of d, where both losses begin
+        acted.forward(samples, rows, Some(offsets.draw(rows.len(), &mut rng(OFFSETS))));
+
+        // L_BC, d_conv = Behavior_Cloning(pi_theta, d): Algorithm 2, Eq. 3 and 4
+        let d = bc::Batch { samples, rows, demos: demos.len() as f64 };
+        let (l_bc, d_conv) = behavior_cloning(acted, d, bc_choices, &mut rng("train.bc"), bc_work);
         finite(l_bc.name, l_bc.value, BC_REMEDY)?;
-        let alpha = mixing.weight(d_conv); // alpha_e = d_conv, no gradient through it
+        let alpha = mixing.weight(d_conv); // alpha_e = d_conv; no gradient goes through it
 
-        // Algorithm 3, Eq. 5
-        let l_sc = match &self.model {
-            Some(model) if alpha > 0.0 => {
-                let (mut rng, lengths) = (stream(self.seed, "train.sc", self.draws), demos.iter().map(|d| corpus.demo(*d).len()));
-                draw_segments(lengths.clone(), self.settings.rho, self.settings.sc.pairs, &mut rng, segments);
-                let sampled = sc_choices.action == ActionChoice::Sample;
-                draw_noise(sampled, rows.len() * corpus.layout.action_dim(), &mut rng, noise);
-                pushes.draw(lengths, &mut rng);
-                let batch = sc::Batch { corpus, rows, demos: demos.len(), segments, noise, pushes: pushes.rows() };
-                let l_sc = state_cloning(&descent.policy, &model.dynamics, acted, batch, sc_choices, sc_work);
-                finite(l_sc.name, l_sc.value, SC_REMEDY)?;
-                Some(l_sc)
-            }
-            _ => None,
-        };
+        // L_SC = State_Cloning(pi_theta, f_phi, d, rho): Algorithm 3, Eq. 5
+        let l_sc = f_phi.as_ref().filter(|_| alpha > 0.0).map(|f_phi| {
+            let networks = (&descent.policy, &f_phi.dynamics);
+            sc.run(networks, acted, (train, demos, rows), &mut rng("train.sc"))
+        });
+        l_sc.map_or(Ok(()), |l_sc| finite(l_sc.name, l_sc.value, SC_REMEDY))?;
         if let Some(row) = norms {
-            let bc_norm = descent.gradient_norm(acted, 1.0 * l_bc);
-            let sc_norm = l_sc.map_or(f64::NAN, |l_sc| descent.gradient_norm(acted, 1.0 * l_sc));
-            mixing.see_norms(bc_norm, sc_norm);
-            row.set("grad_bc", bc_norm);
-            row.set("grad_sc", sc_norm);
+            measure(descent, acted, [Some(l_bc), l_sc], mixing, row);
         }
 
+        // L_mix = Loss_Mixing(L_BC, L_SC, d_conv): Eq. 1
         let l_mix = match l_sc {
-            Some(l_sc) => (1.0 - alpha) * l_bc + alpha * mixing.sc_scale() * l_sc, // Eq. 1
+            Some(l_sc) => (1.0 - alpha) * l_bc + alpha * mixing.sc_scale() * l_sc,
             None => (1.0 - alpha) * l_bc,
         };
-        descent.update(acted, l_mix, learning_rate); // Eq. 2
 
-        // Eq. 6, on observed transitions only
-        let mut l_model = f64::NAN;
-        if let Some(model) = self.model.as_mut().filter(|_| self.settings.fine_tune_dynamics && mixing.has_sc()) {
-            let (value, norm) = model.update(corpus, rows, self.settings.dynamics_learning_rate);
-            finite("the loss of the dynamics network (Eq. 6)", value, MODEL_REMEDY)?;
-            finite("the gradient of the dynamics network's loss (Eq. 6)", norm, MODEL_REMEDY)?;
-            l_model = value;
-        }
+        // theta <- theta - grad L_mix: Eq. 2
+        descent.update(acted, l_mix, learning_rate);
+
+        // f_phi goes on learning, from observed transitions only: Eq. 6
+        let l_model = match f_phi.as_mut().filter(|_| self.settings.fine_tune_dynamics && mixing.has_sc()) {
+            Some(f_phi) => {
+                let (l_model, norm) = f_phi.update(train, rows, self.settings.dynamics_learning_rate);
+                finite("the loss of the dynamics network (Eq. 6)", l_model, MODEL_REMEDY)?;
+                finite("the gradient of the dynamics network's loss (Eq. 6)", norm, MODEL_REMEDY)?;
+                l_model
+            }
+            None => f64::NAN,
+        };
         let l_sc = l_sc.map_or(f64::NAN, |l_sc| l_sc.value);
         Ok(Update { l_bc: l_bc.value, l_sc, l_mix: l_mix.value(), d_conv, alpha, l_model })
     }
@@ -249,13 +242,27 @@ impl Hil {
 
     /// What an update works on: for its cost.
     pub(super) fn parts(&self) -> (&Policy, Option<&Dynamics>, &[Segment]) {
-        (&self.descent.policy, self.model.as_ref().map(|model| &model.dynamics), &self.work.segments)
+        (&self.descent.policy, self.model.as_ref().map(|model| &model.dynamics), self.work.sc.segments())
     }
 }
 
 const BC_REMEDY: &str = "lower train.learning_rate or train.warm_start_learning_rate";
 const SC_REMEDY: &str = "raise train.rho, set train.clip_norm, or lower train.learning_rate or train.dynamics_learning_rate";
 const MODEL_REMEDY: &str = "lower train.dynamics_learning_rate";
+
+/// Measures and reports the lengths of the gradients of L_BC and L_SC, by which they are balanced.
+fn measure(
+    descent: &mut Descent,
+    acted: &mut Acted,
+    losses: [Option<&PolicyLoss>; 2],
+    mixing: &mut Mixing,
+    row: &mut EpochMetrics,
+) {
+    let [bc, sc] = losses.map(|loss| loss.map_or(f64::NAN, |loss| descent.gradient_norm(acted, 1.0 * loss)));
+    mixing.see_norms(bc, sc);
+    row.set("grad_bc", bc);
+    row.set("grad_sc", sc);
+}
 
 /// Updates of an epoch of Algorithm 1.
 fn per_epoch(corpus: &Corpus, settings: &TrainSettings) -> u64 {
