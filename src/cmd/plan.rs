@@ -6,10 +6,7 @@ use super::{Context, Outcome, dropped};
 use crate::config::{Pipeline, Stage};
 use crate::data::{Provenance, table_file};
 use crate::error::{Error, Result};
-use crate::interrupt::Interrupt;
-use crate::plan::{Block, Plan, PlanError, Planned, Planner, block_from_table, block_to_table, to_table};
-use crate::seed;
-use crate::tasks::draw_scene;
+use crate::plan::{Block, Plan, Planned, Planner, block_from_table, block_to_table, plan_episode, to_table};
 use rayon::prelude::*;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -165,23 +162,6 @@ impl PlanStage<'_> {
         table_file::write_groups(out, groups, self.provenance)?;
         Ok(reasons)
     }
-}
-
-/// The plan of an episode of a seed, or why there is none.
-///
-/// # Errors
-/// [`crate::error::Error::Usage`] when there is no room for the scene; [`crate::error::Error::Interrupted`].
-pub fn plan_episode(
-    planner: &mut Planner,
-    of: &Pipeline,
-    (seed, episode): (u64, u64),
-    interrupt: &Interrupt,
-) -> Result<std::result::Result<Plan, PlanError>> {
-    interrupt.check()?;
-    let scene = draw_scene(&of.robot, &of.task, &of.scene, &mut seed::stream(seed, "plan.scene", episode))?;
-    let plan = planner.plan(episode, &scene, &mut seed::stream(seed, "plan.search", episode));
-    interrupt.check()?;
-    Ok(plan)
 }
 
 /// The plans; the reasons of the others go to `reasons`.

@@ -9,10 +9,8 @@ use crate::data::origin::Kind;
 use crate::data::{Provenance, atomic, recording, table_file};
 use crate::demo::Episode;
 use crate::error::{Error, Result};
-use crate::interrupt::Interrupt;
 use crate::plan::{Plan, Plans};
-use crate::seed;
-use crate::sim::{Disturbance, Follower, run_episode};
+use crate::sim::{Follower, execute};
 use crate::task::FailureClass;
 use rayon::prelude::*;
 use std::collections::HashSet;
@@ -101,15 +99,6 @@ fn check_plans(path: &Path, of: &Pipeline, plans: &table_file::Reader, context: 
 fn follower(path: &Path, plan: &Plan) -> Result<Follower> {
     let unusable = || Error::input(path, format!("plan {} has no approach or no carry; run `hilt plan` again", plan.index));
     Follower::new(plan).ok_or_else(unusable)
-}
-
-/// Executes a plan with the noise of a seed.
-///
-/// # Errors
-/// [`Error::Interrupted`].
-pub fn execute(plan: &Plan, mut follower: Follower, of: &SimulateSettings, seed: u64, interrupt: &Interrupt) -> Result<Episode> {
-    let mut disturbance = Disturbance::new(&plan.scene.robot, of, seed::stream(seed, "simulate.noise", plan.index));
-    run_episode(plan.index, &plan.scene, &mut follower, &mut disturbance, of.max_steps, interrupt)
 }
 
 /// What is said of all episodes in the end.

@@ -2,12 +2,10 @@
 //! demonstrations are given; and nothing is written.
 
 use super::Context;
-use super::plan::plan_episode;
-use super::simulate::execute;
 use crate::config::{ChosenTask, Pipeline, Preset, Source};
 use crate::error::Result;
-use crate::plan::Planner;
-use crate::sim::Follower;
+use crate::plan::{Planner, plan_episode};
+use crate::sim::{Follower, execute};
 use crate::task::FailureClass;
 use rayon::prelude::*;
 use serde::Serialize;

@@ -3,8 +3,8 @@
 
 use super::{ContentHash, Provenance, dataset, json_file, recording, table_file, weights};
 use crate::error::{Error, Result};
-use crate::interrupt;
 use rayon::prelude::*;
+use std::fs::DirEntry;
 use std::path::{Path, PathBuf};
 
 /// A kind of artefact.
@@ -69,14 +69,19 @@ pub fn provenance(path: &Path, kind: Kind) -> Result<Provenance> {
 
 /// The content of these files below a directory.
 fn content_of(root: &Path, files: &[PathBuf]) -> Result<ContentHash> {
-    let _waits = interrupt::waiting();
     let hash = |file: &PathBuf| {
-        let bytes = std::fs::read(file).map_err(|e| Error::io(file, "read", e))?;
         let name = file.strip_prefix(root).unwrap_or(file).to_string_lossy().into_owned();
-        Ok((name, ContentHash::of(&bytes)))
+        Ok((name, ContentHash::of_file(file)?))
     };
     let hashes = files.par_iter().map(hash).collect::<Result<Vec<_>>>()?;
     Ok(ContentHash::of_directory(hashes.iter().map(|(name, hash)| (name.as_str(), *hash))))
+}
+
+/// Bytes of a file, or of all files below a directory, links to directories aside; what cannot be read has none.
+pub fn bytes_of(path: &Path) -> u64 {
+    let Ok(entries) = std::fs::read_dir(path) else { return std::fs::metadata(path).map_or(0, |found| found.len()) };
+    let leads_away = |entry: &DirEntry| entry.file_type().is_ok_and(|kind| kind.is_symlink()) && entry.path().is_dir();
+    entries.flatten().filter(|entry| !leads_away(entry)).map(|entry| bytes_of(&entry.path())).sum()
 }
 
 fn files_below(dir: &Path, found: &mut Vec<PathBuf>) -> std::io::Result<()> {

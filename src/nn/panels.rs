@@ -12,13 +12,13 @@ pub struct Panels {
 }
 
 impl Panels {
-    /// Sees to it that [`Panels::reserve`] for at most `panels` panels of this width does not allocate.
-    pub fn provide(&mut self, width: usize, panels: usize) {
+    /// Sees to it that [`Panels::grow`] for at most `panels` panels of this width does not allocate.
+    pub fn reserve(&mut self, width: usize, panels: usize) {
         self.data.reserve((width * panels).saturating_sub(self.data.len()));
     }
 
     /// Room for `panels` panels of this width, all 0 where it is new; keeps what is there and never shrinks under one width.
-    pub fn reserve(&mut self, width: usize, panels: usize) {
+    pub fn grow(&mut self, width: usize, panels: usize) {
         if self.width != width {
             self.data.clear();
             self.width = width;
@@ -128,7 +128,7 @@ mod tests {
     #[test]
     fn rows_come_back_and_tails_are_cleared() {
         let mut panels = Panels::default();
-        panels.reserve(3, panels_of(11));
+        panels.grow(3, panels_of(11));
         let rows: Vec<[f32; 3]> = (0..11).map(|r| [r as f32, 10.0 + r as f32, -1.0]).collect();
         rows.iter().enumerate().for_each(|(r, row)| panels.write_row(r, row));
         let mut together = panels.clone();

@@ -4,6 +4,7 @@
 //! something stands in the way.
 
 mod block;
+mod episode;
 mod grasp;
 mod path;
 mod planner;
@@ -15,6 +16,7 @@ mod transit;
 mod world;
 
 pub use block::{Block, Planned, block_from_table, block_to_table};
+pub use episode::plan_episode;
 pub use grasp::RELEASE_GAP_M;
 pub use planner::Planner;
 pub use smooth::Limits;

@@ -7,6 +7,7 @@ mod convert;
 mod disturbance;
 mod env;
 mod episode;
+mod execute;
 mod follower;
 #[cfg(test)]
 mod free_motion_tests;
@@ -17,6 +18,7 @@ mod world;
 pub use disturbance::Disturbance;
 pub use env::TaskEnv;
 pub use episode::{Controller, fallen, run_episode, run_episode_from};
+pub use execute::execute;
 pub use follower::Follower;
 pub use physics::{Grain, Physics};
 pub use reexecute::reexecute;

@@ -1,10 +1,10 @@
 #!/usr/bin/env bash
-# A tiny experiment three ways: by hilt itself, by Snakemake, and by a real slurmctld and slurmd on loopback. All must leave the same bytes, also
-# when they are killed (SIGKILL) at five random moments and begun again.
+# A tiny experiment four ways: by hilt itself, by Snakemake, by a real slurmctld and slurmd on loopback, and by Snakemake's executor for Slurm
+# there. All must leave the same bytes, the two in the middle also when they are killed (SIGKILL) at five random moments and begun again.
 #
 #   run.sh HILT
 #
-# Needs root. Installs what is missing: Snakemake into target/cluster/venv (pip), Slurm and munge (apt).
+# Needs root. Installs what is missing: Snakemake and its executor into target/cluster/venv (pip, Python 3.11), Slurm and munge (apt).
 set -eu -o pipefail
 export LC_ALL=C
 
@@ -18,9 +18,10 @@ say() { echo "cluster-test: $*"; }
 die() { echo "cluster-test: $*" >&2; exit 1; }
 
 install() {
-    if ! [ -x "$venv/bin/snakemake" ]; then
-        say "installs snakemake into $venv"
-        python3 -m venv "$venv" > "$work/pip.log" 2>&1 && "$venv/bin/pip" install -q snakemake >> "$work/pip.log" 2>&1 \
+    if ! "$venv/bin/python" -c "import snakemake, snakemake_executor_plugin_slurm" 2> /dev/null; then
+        say "installs snakemake and its executor for slurm into $venv"
+        python3 -m venv "$venv" > "$work/pip.log" 2>&1 \
+            && "$venv/bin/pip" install -q snakemake snakemake-executor-plugin-slurm >> "$work/pip.log" 2>&1 \
             || die "snakemake is missing and could not be installed (needs python3-venv and a package index): $work/pip.log"
     fi
     local missing= program
@@ -41,10 +42,12 @@ stop() {
     local pid
     for pid in "${pids[@]}"; do kill "$pid" 2> /dev/null || true; done
     for pid in "${pids[@]}"; do wait "$pid" 2> /dev/null || true; done
+    [ -z "$linked" ] || rm -f "$own_conf"
     # What the daemons said stays where something went wrong.
     [ -z "$done" ] || rm -rf "$cluster"
 }
-done= cluster=
+done= cluster= linked=
+own_conf=/etc/slurm/slurm.conf
 trap stop EXIT
 
 # Daemons of our own beside whatever the machine has: own ports, own directories, own key.
@@ -85,8 +88,8 @@ SlurmctldLogFile=$dir/slurmctld.log
 SlurmdLogFile=$dir/slurmd.log
 ReturnToService=2
 SchedulerParameters=sched_interval=1,batch_sched_delay=0,bf_interval=1
-NodeName=$host NodeAddr=127.0.0.1 CPUs=$(nproc) State=UNKNOWN
-PartitionName=all Nodes=$host Default=YES MaxTime=INFINITE State=UP
+NodeName=$host NodeAddr=127.0.0.1 CPUs=$(nproc) RealMemory=1000 State=UNKNOWN
+PartitionName=loopback Nodes=$host Default=YES MaxTime=INFINITE State=UP
 EOF
     export SLURM_CONF=$dir/slurm.conf
     local tries=0
@@ -109,8 +112,14 @@ EOF
 }
 
 kills=5
-# A moment in the first half or so of as many seconds as an undisturbed run takes: the later kills find work too.
-random() { awk -v most="$1" -v n="$RANDOM" 'BEGIN { printf "%.2f\n", 0.5 + 0.6 * n / 32768 * most }'; }
+files() { find runs -type f | wc -l; }
+# Until some more of the run is there, while `WORKS...` says that it goes on, and then a random moment: each kill finds work.
+a_moment() {
+    local before
+    before=$(files)
+    while "$@" && [ "$(files)" -lt $((before + 5)) ]; do sleep 0.05; done
+    sleep "0.$((RANDOM % 6))"
+}
 
 snakemake() { "$venv/bin/snakemake" --cores "$threads" --snakefile runs/experiments/tiny/Snakefile "$@" >> snakemake.log 2>&1; }
 
@@ -119,18 +128,20 @@ killed_snakemake() {
     for kill in $(seq $kills); do
         setsid "$venv/bin/snakemake" --cores "$threads" --snakefile runs/experiments/tiny/Snakefile --rerun-incomplete >> snakemake.log 2>&1 &
         pid=$!
-        sleep "$(random "$snakemake_s")"
+        a_moment kill -0 "$pid"
         kill -KILL -- "-$pid" 2> /dev/null || true
         wait "$pid" 2> /dev/null || true
-        say "snakemake killed ($kill): $(find runs -type f -name 'evaluation.json' | wc -l) of 6 evaluations are there"
+        say "snakemake killed ($kill): $(files) files are there"
         snakemake --unlock
     done
     snakemake --rerun-incomplete || die "snakemake failed: $PWD/snakemake.log"
 }
 
+is_queued() { squeue --noheader --format=%i 2> /dev/null | grep -q .; }
+
 queue_is_empty() {
     local tries=0
-    while squeue --noheader --format=%i 2> /dev/null | grep -q .; do
+    while is_queued; do
         tries=$((tries + 1))
         [ $tries -lt 1200 ] || die "slurm is not done after ten minutes: $PWD"
         sleep 0.5
@@ -141,13 +152,20 @@ killed_slurm() {
     local kill
     for kill in $(seq $kills); do
         bash runs/experiments/tiny/submit.sh --time=10 > submitted
-        sleep "$(random "$slurm_s")"
+        a_moment is_queued
         scancel --full --signal=KILL --user root --state RUNNING 2> /dev/null || true
         scancel --user root
         queue_is_empty
-        say "slurm killed ($kill): $(find runs -type f -name 'evaluation.json' | wc -l) of 6 evaluations are there"
+        say "slurm killed ($kill): $(files) files are there"
     done
     by_slurm
+}
+
+# Slurm keeps no accounts here, so jobs are asked for by squeue and have none.
+snakemake_on_slurm() {
+    "$venv/bin/snakemake" --executor slurm --jobs "$threads" --snakefile runs/experiments/tiny/Snakefile --slurm-status-command squeue \
+        --slurm-init-seconds-before-status-checks 3 --seconds-between-status-checks 3 --default-resources \
+        slurm_partition=loopback runtime=10 mem_mb=200 >> snakemake.log 2>&1
 }
 
 by_slurm() {
@@ -160,7 +178,7 @@ listing() { (cd "$1/runs/experiments/tiny" && find . -type f ! -path './logs/*' 
 
 mkdir -p "$work"
 install
-for way in plain snakemake snakemake-killed slurm slurm-killed; do
+for way in plain snakemake snakemake-killed slurm slurm-killed snakemake-on-slurm; do
     rm -rf "${work:?}/$way"
     mkdir -p "$work/$way"
     cp "$root/tests/cluster/tiny.toml" "$work/$way"
@@ -183,10 +201,10 @@ cd "$work/snakemake"
 "$hilt" experiment tiny.toml --quiet --threads "$threads" --jobs 1 --emit snakemake
 began=$SECONDS
 snakemake || die "snakemake failed: $PWD/snakemake.log"
-snakemake_s=$((SECONDS - began))
+took=$((SECONDS - began))
 "$venv/bin/snakemake" --cores "$threads" --snakefile runs/experiments/tiny/Snakefile --dry-run 2>&1 | grep -q 'Nothing to be done' \
     || die "snakemake would run steps again that are done"
-say "snakemake $("$venv/bin/snakemake" --version) takes $snakemake_s s"
+say "snakemake $("$venv/bin/snakemake" --version) takes $took s"
 compare snakemake
 cd "$work/snakemake-killed"
 "$hilt" experiment tiny.toml --quiet --threads "$threads" --jobs 1 --emit snakemake
@@ -198,12 +216,23 @@ cd "$work/slurm"
 "$hilt" experiment tiny.toml --quiet --threads 1 --jobs 1 --emit slurm
 began=$SECONDS
 by_slurm
-slurm_s=$((SECONDS - began))
-say "slurm takes $slurm_s s"
+say "slurm takes $((SECONDS - began)) s"
 compare slurm
 cd "$work/slurm-killed"
 "$hilt" experiment tiny.toml --quiet --threads 1 --jobs 1 --emit slurm
 killed_slurm
 compare slurm-killed
-say "all five ways leave the same $(wc -l < "$work/plain.sums") files"
+# The executor takes SLURM_CONF from its jobs, which then look where Slurm's own is.
+ways=five
+if [ -e "$own_conf" ]; then
+    say "snakemake's executor for slurm is left out: this machine has a Slurm of its own"
+else
+    ln -sf "$SLURM_CONF" "$own_conf" && linked=yes
+    cd "$work/snakemake-on-slurm"
+    "$hilt" experiment tiny.toml --quiet --threads "$threads" --jobs 1 --emit snakemake
+    snakemake_on_slurm || die "snakemake's executor for slurm failed: $PWD/snakemake.log"
+    compare snakemake-on-slurm
+    ways=six
+fi
+say "all $ways ways leave the same $(wc -l < "$work/plain.sums") files"
 done=yes

@@ -33,7 +33,7 @@ impl Acted {
         let (rows, dim) = (shards::most_rows(most_rows), policy.layout().action_dim());
         let shard = || {
             let mut shard = Shard { mean: Vec::with_capacity(rows * dim), ..Shard::default() };
-            shard.pass.provide(&policy.net, panels_of(rows));
+            shard.pass.reserve(&policy.net, panels_of(rows));
             shard
         };
         let shards = (0..shards::MAX_SHARDS).map(|_| shard()).collect();
@@ -50,7 +50,7 @@ impl Acted {
             let part = shards::range(rows.len(), active, i);
             let panels = panels_of(part.len());
             shard.rows = part.len();
-            shard.pass.reserve(&policy.net, panels);
+            shard.pass.grow(&policy.net, panels);
             samples.write_inputs(&rows[part.clone()], &mut shard.pass.input);
             offsets.inspect(|offsets| offsets.add(part, &mut shard.pass.input));
             policy.net.forward(&mut shard.pass, 0..panels);

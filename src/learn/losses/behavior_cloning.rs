@@ -69,7 +69,7 @@ impl Workspace {
         let part = || {
             let [residual2, d_log_std, sigma] = std::array::from_fn(|_| vec![0.0; dim]);
             let mut part = Part { residual2, d_log_std, sigma, ..Part::default() };
-            part.noise.provide(dim, panels_of(shards::most_rows(most_rows)));
+            part.noise.reserve(dim, panels_of(shards::most_rows(most_rows)));
             part
         };
         let parts = (0..shards::MAX_SHARDS).map(|_| part()).collect();
@@ -144,7 +144,7 @@ impl Part {
         }
         d_mean.clear_tail(rows.len());
         if !noise.is_empty() {
-            self.noise.reserve(dim, panels_of(rows.len()));
+            self.noise.grow(dim, panels_of(rows.len()));
             self.noise.write_rows(0, rows.len(), |slot| row(noise, dim, slot));
         }
         for (p, rows) in rows.chunks(LANES).enumerate() {

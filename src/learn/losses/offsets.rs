@@ -83,7 +83,7 @@ mod tests {
         let rows: Vec<usize> = (0..corpus.rows()).collect();
         let inputs = |offsets: Option<&Offsets>| {
             let mut panels = Panels::default();
-            panels.reserve(features.width(), crate::nn::panels_of(rows.len()));
+            panels.grow(features.width(), crate::nn::panels_of(rows.len()));
             features.write_transitions(&corpus, rows.len(), |i| rows[i], &mut panels);
             offsets.inspect(|offsets| offsets.add(0..rows.len(), &mut panels));
             panels

@@ -28,7 +28,7 @@ impl PolicyLoss {
         let (d_log_std, d_likelihood) = (vec![0.0; dim], vec![0.0; dim]);
         let mut loss = PolicyLoss { name, d_log_std, d_likelihood, ..PolicyLoss::default() };
         loss.d_mean.resize_with(shards::MAX_SHARDS, Panels::default);
-        loss.d_mean.iter_mut().for_each(|d| d.provide(dim, panels_of(shards::most_rows(most_rows))));
+        loss.d_mean.iter_mut().for_each(|d| d.reserve(dim, panels_of(shards::most_rows(most_rows))));
         loss
     }
 
@@ -40,7 +40,7 @@ impl PolicyLoss {
         let count = shards::count(rows);
         for (i, d_mean) in self.d_mean[..count].iter_mut().enumerate() {
             let panels = panels_of(shards::range(rows, count, i).len());
-            d_mean.reserve(self.d_log_std.len(), panels);
+            d_mean.grow(self.d_log_std.len(), panels);
             d_mean.span_mut(&(0..panels)).fill(Lanes::default());
         }
     }

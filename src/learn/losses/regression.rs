@@ -38,7 +38,7 @@ impl Regression {
     pub fn loss(&mut self, net: &Mlp, samples: &impl Samples, rows: &[usize], loss: &Loss, learn: bool) -> f64 {
         let active = shards::count(rows.len());
         self.shards.resize_with(shards::MAX_SHARDS, Shard::default);
-        self.shards.iter_mut().for_each(|shard| shard.reserve(net));
+        self.shards.iter_mut().for_each(|shard| shard.grow(net));
         self.shards[..active].par_iter_mut().enumerate().for_each(|(i, shard)| {
             shard.run(net, samples, &rows[shards::range(rows.len(), active, i)], loss, learn);
         });
@@ -51,9 +51,9 @@ impl Regression {
 }
 
 impl Shard {
-    fn reserve(&mut self, net: &Mlp) {
-        self.pass.provide(net, BLOCK_PANELS);
+    fn grow(&mut self, net: &Mlp) {
         self.pass.reserve(net, BLOCK_PANELS);
+        self.pass.grow(net, BLOCK_PANELS);
     }
 
     fn run(&mut self, net: &Mlp, samples: &impl Samples, rows: &[usize], loss: &Loss, learn: bool) {

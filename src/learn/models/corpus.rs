@@ -130,7 +130,7 @@ impl Corpus {
         let width = self.relating.width();
         let (mut all, mut state) = (vec![0.0; self.rows() * width], vec![Lanes::default(); self.layout.state_dim()]);
         let mut panel = Panels::default();
-        panel.reserve(width, 1);
+        panel.grow(width, 1);
         for (block, to) in all.chunks_mut(LANES * width).enumerate() {
             kernel::interleave(&mut state, from_fn(|lane| self.state((block * LANES + lane).min(self.rows() - 1))));
             panel.panel_mut(0).copy_from_slice(&self.relating.relations(&state, &self.relating.hand(&state))[..width]);

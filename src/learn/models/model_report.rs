@@ -147,10 +147,10 @@ fn advance(dynamics: &Dynamics, corpus: &Corpus, model: Model, first: usize, sta
             }
         }
         Model::Network => {
-            pass.reserve(&dynamics.net, 1);
+            pass.grow(&dynamics.net, 1);
             let (mut panel, mut actions) = (Panels::default(), Panels::default());
-            panel.reserve(dim, 1);
-            actions.reserve(layout.action_dim(), 1);
+            panel.grow(dim, 1);
+            actions.grow(layout.action_dim(), 1);
             for (p, block) in states.chunks_mut(LANES * dim).enumerate() {
                 for (r, state) in block.chunks_exact(dim).enumerate() {
                     panel.write_row(r, state);

@@ -42,7 +42,7 @@ fn gradients_of_every_layer_equal_finite_differences() {
         mlp.finish_gradient([&mut pass], &mut added);
         assert_eq!(learned, added);
         let d_input = std::mem::take(&mut pass.d_input);
-        pass.reserve(&mlp, panels);
+        pass.grow(&mlp, panels);
         mlp.backward_through(&mut pass, 0..1);
         mlp.backward_through(&mut pass, 1..panels);
         assert_eq!(pass.d_input, d_input);

@@ -3,6 +3,7 @@
 use super::artefacts::Artefact;
 use super::stamp::Stamp;
 use crate::config::Stage;
+use crate::data::origin::bytes_of;
 use crate::data::{ContentHash, Provenance};
 use serde::Serialize;
 use serde_json::{Value, json};
@@ -151,11 +152,4 @@ impl Standing {
 /// The last part of a path, for people.
 pub(super) fn file_name(path: &Path) -> String {
     path.file_name().unwrap_or(path.as_os_str()).to_string_lossy().into_owned()
-}
-
-/// Bytes of a file, or of all files below a directory; what cannot be read has none.
-pub(super) fn bytes_of(path: &Path) -> u64 {
-    let Ok(entries) = std::fs::read_dir(path) else { return std::fs::metadata(path).map_or(0, |found| found.len()) };
-    let entries = entries.filter_map(|entry| entry.ok());
-    entries.filter(|entry| !entry.file_type().is_ok_and(|kind| kind.is_symlink())).map(|entry| bytes_of(&entry.path())).sum()
 }

@@ -4,10 +4,8 @@ use super::{INFO, Root, episodes};
 use crate::data::ContentHash;
 use crate::data::dataset::meta::{DATA, TASKS};
 use crate::data::parquet_stream::Stream;
-use crate::error::{Error, Result};
-use crate::interrupt;
-use std::fs::File;
-use std::path::{Path, PathBuf};
+use crate::error::Result;
+use std::path::PathBuf;
 
 /// Names the content of all files that rows, episodes and tasks are read from.
 pub(in crate::data::dataset) fn content(root: &Root) -> Result<ContentHash> {
@@ -17,16 +15,9 @@ pub(in crate::data::dataset) fn content(root: &Root) -> Result<ContentHash> {
     let mut hashes = vec![(INFO.to_string(), root.info.hash)];
     for path in paths.iter().filter(|path| path.is_file()) {
         let name = path.strip_prefix(&root.path).unwrap_or(path).display().to_string();
-        hashes.push((name, hash(path)?));
+        hashes.push((name, ContentHash::of_file(path)?));
     }
     Ok(ContentHash::of_directory(hashes.iter().map(|(name, hash)| (name.as_str(), *hash))))
-}
-
-fn hash(path: &Path) -> Result<ContentHash> {
-    let mut hash = blake3::Hasher::new();
-    let _waits = interrupt::waiting();
-    File::open(path).and_then(|file| hash.update_reader(file).map(drop)).map_err(|e| Error::io(path, "read", e))?;
-    Ok(ContentHash(hash.finalize()))
 }
 
 /// The names of the columns, in the order of the first data file.

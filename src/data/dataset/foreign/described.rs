@@ -1,9 +1,9 @@
 //! What a dataset says of itself, for people and programs.
 
 use super::{Declared, Root, instructions};
+use crate::data::origin::bytes_of;
 use crate::error::Result;
 use serde_json::{Value, json};
-use std::path::Path;
 
 /// Episodes, frames, rate, columns, tasks and sizes of a dataset, whoever wrote it.
 ///
@@ -26,17 +26,6 @@ pub fn described(root: &Root) -> Result<Value> {
         "robot_type": info.robot_type,
         "columns": info.features.iter().map(column).collect::<Vec<_>>(),
         "tasks": instructions(&root.path)?,
-        "bytes": bytes_below(&root.path),
+        "bytes": bytes_of(&root.path),
     }))
-}
-
-/// Bytes of all files below a directory, as far as they can be seen.
-fn bytes_below(dir: &Path) -> u64 {
-    let entries = std::fs::read_dir(dir).into_iter().flatten().flatten();
-    let of = |entry: std::fs::DirEntry| match entry.file_type() {
-        Ok(kind) if kind.is_dir() => bytes_below(&entry.path()),
-        Ok(_) => entry.metadata().map_or(0, |found| found.len()),
-        Err(_) => 0,
-    };
-    entries.map(of).sum()
 }

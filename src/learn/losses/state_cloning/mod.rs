@@ -62,7 +62,7 @@ pub fn state_cloning<'a>(
     sorted.extend_from_slice(batch.segments);
     sorted.sort_unstable_by_key(|s| (std::cmp::Reverse(s.steps), s.start));
     let active = shards::count(rows).min(shards::MAX_SEGMENT_SHARDS);
-    rollouts.iter_mut().for_each(|rollout| rollout.provide(policy, dynamics, most_rows, longest));
+    rollouts.iter_mut().for_each(|rollout| rollout.reserve(policy, dynamics, most_rows, longest));
     let setting = Setting { policy, dynamics, mean: acted.mean(), batch, choices };
     rollouts[..active].par_iter_mut().enumerate().for_each(|(i, rollout)| rollout.run(share(sorted, active, i), setting));
 

@@ -98,7 +98,7 @@ fn groups(segments: &[Segment]) -> impl Iterator<Item = &[Segment]> {
 
 impl Rollout {
     /// Allocates for any segments of `rows` transitions, none of more than `longest` steps.
-    pub fn provide(&mut self, policy: &Policy, dynamics: &Dynamics, rows: usize, longest: usize) {
+    pub fn reserve(&mut self, policy: &Policy, dynamics: &Dynamics, rows: usize, longest: usize) {
         let layout = dynamics.layout();
         let (dim, changing) = (layout.action_dim(), layout.changing());
         self.first_rows.clear();
@@ -109,15 +109,15 @@ impl Rollout {
         self.d_log_std.resize(dim, 0.0);
         let rows = rows.min(GROUP_STEPS + GROUP_SEGMENTS * longest);
         let (first, panels) = (panels_of(rows), panels_of(rows) + longest); // each depth may leave one panel half empty
-        self.policy.provide(&policy.net, panels);
-        self.model.provide(&dynamics.net, panels);
-        self.states.provide(layout.state_dim(), panels);
-        self.predictions.provide(changing, panels);
-        self.d_states.provide(changing, first);
-        self.taught.provide(layout.fingers().len(), first);
+        self.policy.reserve(&policy.net, panels);
+        self.model.reserve(&dynamics.net, panels);
+        self.states.reserve(layout.state_dim(), panels);
+        self.predictions.reserve(changing, panels);
+        self.d_states.reserve(changing, first);
+        self.taught.reserve(layout.fingers().len(), first);
         [&mut self.actions, &mut self.noise, &mut self.pushes, &mut self.d_first]
             .into_iter()
-            .for_each(|array| array.provide(dim, first));
+            .for_each(|array| array.reserve(dim, first));
         self.hands.reserve(panels.saturating_sub(self.hands.len()));
         self.segments.clear();
         self.segments.reserve(rows);
@@ -184,16 +184,16 @@ impl Rollout {
         let Setting { policy, dynamics, batch, .. } = setting;
         let panels: usize = self.counts.iter().map(|c| panels_of(*c)).sum();
         let (layout, first) = (dynamics.layout(), panels_of(self.segments.len()));
-        self.policy.reserve(&policy.net, panels - first);
-        self.model.reserve(&dynamics.net, panels);
-        self.states.reserve(layout.state_dim(), panels);
+        self.policy.grow(&policy.net, panels - first);
+        self.model.grow(&dynamics.net, panels);
+        self.states.grow(layout.state_dim(), panels);
         self.hands.resize(panels, Hand::default());
-        self.predictions.reserve(layout.changing(), panels);
+        self.predictions.grow(layout.changing(), panels);
         for array in [&mut self.actions, &mut self.noise, &mut self.pushes, &mut self.d_first] {
-            array.reserve(layout.action_dim(), first);
+            array.grow(layout.action_dim(), first);
         }
-        self.d_states.reserve(layout.changing(), first);
-        self.taught.reserve(layout.fingers().len(), first);
+        self.d_states.grow(layout.changing(), first);
+        self.taught.grow(layout.fingers().len(), first);
         self.d_states.span_mut(&(0..first)).fill(Lanes::default());
         let demo_row = |i: usize| batch.rows[self.segments[i].start];
         self.states.write_rows(0, self.segments.len(), |i| batch.corpus.state(demo_row(i)));

@@ -78,7 +78,7 @@ impl Group {
 
     /// Statistics of what the worlds show first, filled into `record.sums`.
     pub fn first_sight(&mut self, policy: &Policy, record: &mut Record) {
-        record.inputs.reserve(policy.features().width(), 1);
+        record.inputs.grow(policy.features().width(), 1);
         self.see(policy, 0, LANES, record);
     }
 
@@ -126,15 +126,15 @@ impl Group {
 
     fn begin(&mut self, actors: &Actors, record: &mut Record) {
         let steps = actors.steps;
-        record.inputs.reserve(actors.policy.features().width(), steps + 1);
-        record.actions.reserve(actors.policy.log_std.len(), steps);
+        record.inputs.grow(actors.policy.features().width(), steps + 1);
+        record.actions.grow(actors.policy.log_std.len(), steps);
         for lanes in [&mut record.log_prob, &mut record.advantages, &mut record.returns, &mut self.rewards] {
             lanes.resize(steps, Lanes::default());
         }
         record.finished.clear();
         self.ends.resize(steps, [None; LANES]);
-        self.pass.reserve(&actors.policy.net, 1);
-        self.value_pass.reserve(actors.value, steps + 1);
+        self.pass.grow(&actors.policy.net, 1);
+        self.value_pass.grow(actors.value, steps + 1);
         self.cut.clear();
         self.cut_off.clear();
     }
@@ -176,7 +176,7 @@ impl Group {
     fn promise(&mut self, actors: &Actors) {
         let rows: Vec<&[f32]> = self.cut_off.chunks_exact(self.state.len()).collect();
         let mut unseen = Sums::default();
-        self.value_pass.reserve(actors.value, panels_of(rows.len()));
+        self.value_pass.grow(actors.value, panels_of(rows.len()));
         for (p, rows) in rows.chunks(LANES).enumerate() {
             kernel::interleave(&mut self.state, from_fn(|lane| rows[lane.min(rows.len() - 1)]));
             look(actors.policy.features(), &self.state, self.value_pass.input.panel_mut(p), &mut unseen, 0);

@@ -100,7 +100,7 @@ impl Work {
 impl Shard {
     fn forward(&mut self, policy: &Policy, value: &Mlp, records: &[Record], panels: &[(usize, usize)]) {
         for (net, pass) in [(&policy.net, &mut self.policy), (value, &mut self.value)] {
-            pass.reserve(net, panels.len());
+            pass.grow(net, panels.len());
             for (p, (group, step)) in panels.iter().enumerate() {
                 pass.input.panel_mut(p).copy_from_slice(records[*group].inputs.panel(*step));
             }
