@@ -3,12 +3,12 @@
 //!
 //! | Function HIL(D, rho) | here |
 //! |---|---|
-//! | initialise pi_theta and f_phi | [`Hil::new`], [`Dynamics::new`] |
-//! | f_phi = Pretrain_Dynamics_Network(f_phi, D, E) | [`super::pretrain_dynamics`] (Algorithm 4), before: `hilt pretrain` |
-//! | for e = 0 ... E | the stages of [`Hil`] (`stages.rs`), run by [`crate::learn::run`] |
+//! | initialise pi_theta and f_phi | `Hil::new`, `Dynamics::new` |
+//! | f_phi = Pretrain_Dynamics_Network(f_phi, D, E) | `pretrain_dynamics` (Algorithm 4), before: `hilt pretrain` |
+//! | for e = 0 ... E | the stages of `Hil` (`stages.rs`), gone through by `learn::run` |
 //! | for i = 0 ... the number of demos: sample d from D | `hybrid_imitation_learning` |
-//! | L_BC, d_conv; L_SC; L_mix; theta <- theta - grad L_mix | [`Hil::update`] |
-//! | return pi_theta | `policy`, as [`crate::learn::run`] selects it |
+//! | L_BC, d_conv; L_SC; L_mix; theta <- theta - grad L_mix | `Hil::update` |
+//! | return pi_theta | the policy that `learn::run` selects |
 
 mod metrics;
 mod stages;
