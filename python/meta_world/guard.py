@@ -27,6 +27,8 @@ def built(binary):
         sys.exit(f"error: --hilt {binary} does not run: {why}; give the binary, as target/release/hilt after make build")
     lines = dict(line.partition(": ")[::2] for line in said.splitlines()[1:])
     commit = lines.get("commit")
+    if commit and commit.startswith("unknown"):  # built outside of a repository
+        commit = None
     found = {"hilt": " ".join(said.split("\n")[0].split()[:2]), "commit": commit}
     return found if commit and not commit.endswith("-dirty") else found | {"binary_sha256": sha256(binary)}
 

@@ -22,8 +22,8 @@ def binary(path, commit, more=""):
 
 def test_which_hilt_it_is(tmp_path):
     assert guard.built(binary(tmp_path / "a", "abc")) == {"hilt": "hilt 0.1.0", "commit": "abc"}
-    for commit in (None, "abc-dirty"):
-        first, other = [guard.built(binary(tmp_path / name, commit, more)) for name, more in (("b", ""), ("c", ": more"))]
+    for said, commit in ((None, None), ("abc-dirty", "abc-dirty"), ("unknown: not built from its repository", None)):
+        first, other = [guard.built(binary(tmp_path / name, said, more)) for name, more in (("b", ""), ("c", ": more"))]
         assert first["commit"] == commit and first["binary_sha256"] != other["binary_sha256"], "the commit does not say all"
     with pytest.raises(SystemExit, match="does not run"):
         guard.built(str(tmp_path / "none"))

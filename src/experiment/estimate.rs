@@ -1,4 +1,4 @@
-//! How long steps take: by the wall times of finished ones of the same stage and task, otherwise by rates that were measured once.
+//! How long steps take: by the wall times of finished ones of the same stage, task and method, otherwise by rates that were measured once.
 
 use super::runs::Grid;
 use super::state::State;

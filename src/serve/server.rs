@@ -14,6 +14,7 @@ use std::io::ErrorKind;
 use std::net::{IpAddr, SocketAddr, TcpListener, TcpStream};
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::thread;
+use std::time::Duration;
 
 /// Callers at the same time who have not yet said who they are: more than come at once, less than a machine has threads.
 const MOST_CALLERS: usize = 64;
@@ -25,6 +26,8 @@ pub struct Server {
     token: Option<Token>,
     /// Conversations at the same time.
     most: usize,
+    /// Who has been silent for so long gives way to others.
+    patience: Duration,
 }
 
 /// What is said and answered in one conversation; it ends when the link is gone.
@@ -54,7 +57,12 @@ impl Server {
         };
         let listener = TcpListener::bind(address).map_err(refused)?;
         listener.set_nonblocking(true).map_err(refused)?;
-        Ok(Server { listener, token, most })
+        Ok(Server { listener, token, most, patience: PATIENCE })
+    }
+
+    /// The same with another patience with who is silent where all places are taken.
+    pub fn with_patience(self, patience: Duration) -> Self {
+        Server { patience, ..self }
     }
 
     /// Where it listens.
@@ -70,7 +78,7 @@ impl Server {
     /// # Errors
     /// [`Error::Interrupted`], when all conversations have ended.
     pub fn run(&self, host: &dyn Host, interrupt: &Interrupt, say: &(dyn Fn(&str) + Sync)) -> Result<()> {
-        let (callers, seats) = (AtomicUsize::new(0), Seats::new(self.most, PATIENCE));
+        let (callers, seats) = (AtomicUsize::new(0), Seats::new(self.most, self.patience));
         thread::scope(|scope| {
             for number in 0.. {
                 let (mut stream, peer) = self.next(interrupt)?;

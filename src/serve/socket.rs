@@ -48,25 +48,25 @@ impl Link for SocketLink<'_> {
         while !self.gone {
             self.socket.get_ref().check()?;
             let read = self.socket.read();
-            if read.is_ok() {
-                self.seat.heard();
+            if self.seat.is_lost() {
+                self.refuse("silent for long, and another has come; connect again");
+                self.gone = true;
+                break;
             }
             match read {
                 Ok(Frame::Binary(bytes)) => {
                     self.socket.get_mut().whole();
+                    self.seat.heard();
                     return Ok(Received::Message(Message::Packed(bytes)));
                 }
                 Ok(Frame::Text(_)) => {
                     self.socket.get_mut().whole();
+                    self.seat.heard();
                     let why = "a text frame; messages are binary frames of msgpack";
                     return Ok(Received::Message(Message::Unreadable(why.into())));
                 }
-                // Pings are answered by the next call.
+                // Pings are answered by the next call; who sends nothing else is silent.
                 Ok(_) => self.socket.get_mut().whole(),
-                Err(SocketError::Io(e)) if is_tick(&e) && self.seat.is_lost() => {
-                    self.refuse("silent for long, and another has come; connect again");
-                    self.gone = true;
-                }
                 Err(SocketError::Io(e)) if is_tick(&e) => {
                     if patience.is_some_and(|patience| began.elapsed() >= patience) {
                         return Ok(Received::Silence);

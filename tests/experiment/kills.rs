@@ -27,7 +27,7 @@ fn killed_and_undisturbed(text: &str) {
         let whole_group = kill % 2 == 0;
         if whole_group {
             let group = format!("-{}", child.id());
-            Command::new("kill").args(["-KILL", "--", &group]).status().expect("kill runs");
+            assert!(Command::new("kill").args(["-KILL", "--", &group]).status().expect("kill runs").success());
         }
         // It may have ended by itself.
         let _ = child.kill();

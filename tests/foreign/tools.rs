@@ -52,7 +52,7 @@ fn every_problem_is_named_and_a_sound_dataset_has_none() {
         done(Path::new("."), &["dataset", "validate", &fixture(name).display().to_string()]);
     }
     type Spoil = fn(&mut Made);
-    let spoilt: [(Spoil, &str); 10] = [
+    let spoilt: [(Spoil, &str); 11] = [
         (|m| numbers(m, "action", 5, f64::NAN), "column action, row 5, entry 0: NaN is not a finite number (0 more"),
         (|m| numbers(m, "timestamp", 17, 9.0), "column timestamp, row 17: 9, expected 0.5"),
         (
@@ -75,6 +75,13 @@ fn every_problem_is_named_and_a_sound_dataset_has_none() {
                     Arc::new(Int32Array::from_iter_values((0..60).map(|row| i32::from(row == 59)))) as ArrayRef
             },
             "column task_index, row 59: 1 is none of the 1 tasks",
+        ),
+        (
+            |m| {
+                m.info["features"]["action"]["dtype"] = json!("float32");
+                numbers(m, "action", 31, -1e39);
+            },
+            "column action, row 31: -1e39 is more than float32 holds",
         ),
         (|m| m.info["total_frames"] = json!(61), "says 6 episodes of 61 frames"),
         (|m| m.info["fps"] = json!(12.5), "fps is a whole number"),

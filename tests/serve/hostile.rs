@@ -93,11 +93,13 @@ fn broken_messages_to_a_world_are_each_answered_and_episodes_go_on() {
 fn broken_lines_are_each_answered_and_leave_nothing() {
     let mut rng = stream(3, "hostile", 0);
     let whole = serde_json::json!({ "state": row(), "frame_index": 3, "prompt": "Pick up the block." }).to_string();
-    let mut lines = Vec::new();
+    let (mut lines, mut asked) = (Vec::new(), 1);
     for _ in 0..MESSAGES {
-        let line = mutated(whole.as_bytes(), &mut rng);
-        lines.extend(line.into_iter().filter(|byte| *byte != b'\n'));
-        lines.extend(b" \n");
+        let line: Vec<u8> = mutated(whole.as_bytes(), &mut rng).into_iter().filter(|byte| *byte != b'\n').collect();
+        // A line of blanks alone is none.
+        asked += usize::from(!line.trim_ascii().is_empty());
+        lines.extend(line);
+        lines.extend(b"\n");
     }
     lines.extend(format!("{whole}\n").as_bytes());
     let (mut out, before) = (Vec::new(), memory());
@@ -105,8 +107,8 @@ fn broken_lines_are_each_answered_and_leave_nothing() {
     host(PolicyOptions::default()).converse(&mut link, 0).expect("no interrupt");
     drop(link);
     let answers: Vec<&[u8]> = out.split(|byte| *byte == b'\n').collect();
-    // Behind the metadata; a line of blanks alone is none.
-    assert!((MESSAGES - MESSAGES / 20..=MESSAGES + 3).contains(&answers.len()), "{} answers", answers.len());
+    // Metadata come first, and nothing behind the last end of a line.
+    assert_eq!(answers.len(), 1 + asked + 1);
     let last = String::from_utf8_lossy(answers[answers.len() - 2]);
     assert!(last.contains("\"actions\""), "{last}");
     let growth = memory().saturating_sub(before);
@@ -210,6 +212,19 @@ fn who_has_not_shown_the_token_takes_no_place() {
     let header = Some(("Authorization", "Bearer a secret of enough letters"));
     let mut talk = Talk::with(server.address, header).expect("admitted");
     assert_eq!(talk.ask().len(), 9);
+    server.end();
+}
+
+#[test]
+fn who_is_silent_for_long_gives_way_where_all_places_are_taken() {
+    let patience = Duration::from_millis(600);
+    let server = Served::patient(1, patience);
+    let mut silent = server.talk();
+    assert_eq!(silent.ask().len(), 9);
+    assert!(Talk::with(server.address, None).is_err_and(|why| why.contains("503")));
+    pause::<()>(2 * patience.as_millis() as u64);
+    assert_eq!(server.talk().ask().len(), 9);
+    assert!(matches!(silent.hear(), Some(Message::Text(why)) if why.contains("connect again")) && silent.hear().is_none());
     server.end();
 }
 

@@ -50,6 +50,13 @@ impl Served {
         Self::run(most, token, |server, stop| server.run(&host(PolicyOptions::default()), stop, &|_| ()))
     }
 
+    /// One that is so patient with who is silent.
+    pub fn patient(most: usize, patience: Duration) -> Self {
+        Self::run(most, None, move |server, stop| {
+            server.with_patience(patience).run(&host(PolicyOptions::default()), stop, &|_| ())
+        })
+    }
+
     /// With these options.
     pub fn with(options: PolicyOptions) -> Self {
         Self::run(4, None, |server, stop| server.run(&host(options), stop, &|_| ()))

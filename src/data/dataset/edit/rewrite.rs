@@ -101,6 +101,15 @@ fn check(inputs: &[Input], plan: &Plan) -> Result<()> {
                 first.root.path.display()
             ));
         }
+        let same = match (&input.own, &first.own) {
+            (Some((layout, made)), Some((other, first_made))) => {
+                layout == other && ["task", "robot"].iter().all(|key| made.settings[key] == first_made.settings[key])
+            }
+            (ours, theirs) => ours.is_none() == theirs.is_none(),
+        };
+        if !same {
+            return refuse(format!("and {} are not of the same task and robot", first.root.path.display()));
+        }
         let called = |input: &Input, name: &str| input.features.iter().find(|f| *f.name == *name).and_then(|f| f.names.clone());
         for (name, ..) in &ours {
             if let (Some(ours), Some(theirs)) = (called(first, name), called(input, name))
@@ -120,15 +129,6 @@ fn check(inputs: &[Input], plan: &Plan) -> Result<()> {
             return refuse(format!(
                 "is of a robot \"{theirs}\", {path} of \"{ours}\"; where they are the same correct robot_type in meta/info.json"
             ));
-        }
-        let same = match (&input.own, &first.own) {
-            (Some((layout, made)), Some((other, first_made))) => {
-                layout == other && ["task", "robot"].iter().all(|key| made.settings[key] == first_made.settings[key])
-            }
-            (ours, theirs) => ours.is_none() == theirs.is_none(),
-        };
-        if !same {
-            return refuse(format!("and {} are not of the same task and robot", first.root.path.display()));
         }
     }
     Ok(())
@@ -205,7 +205,9 @@ fn numbered(
 fn task_numbers(input: &Input, form: &Form, found: Option<&Cells>, frames: &Frames, tasks: &[String]) -> Result<Vec<i64>> {
     let at = |text: &String| form.about.tasks.iter().position(|task| task == text).map(|at| at as i64);
     let Some(Cells::I64(old)) = found.filter(|_| !input.instructions.is_empty()) else {
-        return Ok(vec![tasks.first().and_then(at).unwrap_or(0); frames.length]);
+        let own = input.tasks();
+        let number = tasks.first().and_then(at).or_else(|| own.first().and_then(at));
+        return Ok(vec![number.unwrap_or(0); frames.length]);
     };
     let new = |old: &i64| {
         let text = usize::try_from(*old).ok().and_then(|old| input.instructions.get(old));

@@ -13,6 +13,11 @@ use std::sync::Arc;
 /// Appends the numbers of a column, `width` in a row, to `cells`. `Err` has the row at fault, where one is, and what is wrong.
 pub(super) fn append(column: &ArrayRef, width: usize, cells: &mut Cells) -> Result<(), (Option<usize>, String)> {
     let flat = flattened(column, width)?;
+    if let Some(row) =
+        flat.as_primitive_opt::<UInt64Type>().and_then(|array| array.values().iter().position(|v| i64::try_from(*v).is_err()))
+    {
+        return Err((Some(row / width.max(1)), format!("has a whole number above {}", i64::MAX)));
+    }
     let other = || (None, format!("has type {}, meta/info.json says other", column.data_type()));
     match (cells, flat.data_type()) {
         (Cells::Bool(to), DataType::Boolean) => to.extend(flat.as_boolean().values()),
@@ -100,7 +105,7 @@ fn integers(array: &ArrayRef, kind: &DataType, mut take: impl FnMut(i64)) -> Opt
         DataType::UInt8 => each::<UInt8Type>(array, |v| take(i64::from(v))),
         DataType::UInt16 => each::<UInt16Type>(array, |v| take(i64::from(v))),
         DataType::UInt32 => each::<UInt32Type>(array, |v| take(i64::from(v))),
-        DataType::UInt64 => each::<UInt64Type>(array, |v| take(i64::try_from(v).unwrap_or(i64::MAX))),
+        DataType::UInt64 => each::<UInt64Type>(array, |v| take(v as i64)),
         _ => return None,
     }
     Some(())

@@ -116,6 +116,10 @@ impl<'a> Scan<'a> {
                 ),
             );
         }
+        if let Some(at) = values.iter().position(|v| kind == Kind::F32 && v.is_finite() && v.abs() > f64::from(f32::MAX)) {
+            let (row, value) = (self.rows + at / column.width(), values[at]);
+            self.once(name, "single", format!("column {name}, row {row}: {value:e} is more than float32 holds"));
+        }
         self.place(column, &cells);
     }
 
