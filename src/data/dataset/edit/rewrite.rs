@@ -205,8 +205,7 @@ fn numbered(
 fn task_numbers(input: &Input, form: &Form, found: Option<&Cells>, frames: &Frames, tasks: &[String]) -> Result<Vec<i64>> {
     let at = |text: &String| form.about.tasks.iter().position(|task| task == text).map(|at| at as i64);
     let Some(Cells::I64(old)) = found.filter(|_| !input.instructions.is_empty()) else {
-        let own = input.tasks();
-        let number = tasks.first().and_then(at).or_else(|| own.first().and_then(at));
+        let number = tasks.first().and_then(at).or_else(|| input.tasks().first().and_then(at));
         return Ok(vec![number.unwrap_or(0); frames.length]);
     };
     let new = |old: &i64| {
